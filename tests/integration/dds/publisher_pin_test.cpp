@@ -122,12 +122,6 @@ TEST_F(PublisherPinTest, OfTwoPublishersWithOneIdentityNoneIsChosen) {
   EXPECT_EQ(pin.identified(kFirst, kMill, Twin::None, now + 20s), Verdict::NewlyPinned);
 }
 
-TEST_F(PublisherPinTest, APublisherThatHadACopyBesideItWhenItWasChosenIsReleased) {
-  send({kFirst}, 500ms);
-  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Copied);
-  EXPECT_EQ(pin.pinned(), std::nullopt);
-}
-
 TEST_F(PublisherPinTest, ACopyThatAppearsLaterDoesNotReleaseTheFirst) {
   send({kFirst}, 2s);
   EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Pinned);

@@ -84,9 +84,6 @@ class PublisherPin {
   /// Identity comes every second. A participant that has sent for kNoIdentity without one has none.
   /// One that has stated its identity within kPresent is there.
   static constexpr std::chrono::milliseconds kNoIdentity{5000}, kPresent{1500};
-  /// A pinned participant that sees another one of its identity within this time had it beside it
-  /// when it was chosen: its first Identity may have been a second old.
-  static constexpr std::chrono::milliseconds kChoice{1500};
   /// At most this many participants beside the pinned one are remembered. For a further one, that
   /// with the oldest last sample is forgotten.
   static constexpr std::size_t kMostOthers = 7;
@@ -121,8 +118,7 @@ class PublisherPin {
   /// Call it for every sample of the topic Identity.
   Verdict identified(const ParticipantId& from, const std::string& machine_id, Twin twin,
                      Instant now) {
-    const bool chosen_by_chance = twin == Twin::SameId && now - pinned_at_ < kChoice;
-    if (pinned_ == from && (machine_id != machine_id_ || chosen_by_chance)) pinned_.reset();
+    if (pinned_ == from && machine_id != machine_id_) pinned_.reset();
     if (pinned_ != from) find_or_add(from, now).states = Statement{machine_id, twin};
     return heard(from, now);
   }
@@ -216,7 +212,7 @@ class PublisherPin {
     if (next.states) machine_id_ = next.states->machine_id;
     std::erase_if(others_, [&](const Other& other) { return other.id == id; });
     pinned_ = id;
-    pinned_at_ = pinned_heard_ = now;
+    pinned_heard_ = now;
     return Verdict::NewlyPinned;
   }
 
@@ -231,7 +227,7 @@ class PublisherPin {
   std::chrono::milliseconds silence_;
   std::optional<std::string> machine_id_;
   std::optional<ParticipantId> pinned_;
-  Instant pinned_at_{}, pinned_heard_{};
+  Instant pinned_heard_{};
   std::vector<Other> others_;
 };
 

@@ -56,7 +56,6 @@ struct machine {
   char name[sizeof(((abbe_v1_ModelState*)0)->machine)];
   struct publisher publishers[MOST_PUBLISHERS];
   struct publisher* pinned;
-  int64_t pinned_ns; /* since when */
   int64_t ignored_reported_ns;
   abbe_v1_Compensation applied; /* the last vector, while it may be applied */
   int64_t applied_age_ns;       /* when it arrived */
@@ -154,10 +153,11 @@ static void print_state(const abbe_v1_ModelState* state) {
   printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
 }
 
-/* True if the machine has seen another publisher of its machine_id, not only of its name. */
+/* True if the machine has seen another publisher of its name and machine_id. */
 static bool is_copied(const abbe_v1_Identity* identity) {
-  static const char same_id[] = "the same machine_id";
-  return identity->twin && strncmp(identity->twin_seen, same_id, sizeof same_id - 1) == 0;
+  char copy[sizeof identity->machine + 40];
+  snprintf(copy, sizeof copy, "the same machine_id, as machine %s,", identity->machine);
+  return identity->twin && strncmp(identity->twin_seen, copy, strlen(copy)) == 0;
 }
 
 /* True if another publisher that is neither pinned nor foreign states the same identity as `p`, or
@@ -217,7 +217,6 @@ static bool is_pinned(struct machine* m, struct publisher* p) {
     if (!may_be_pinned(m, p, now_ns)) return false;
     if (m->pinned != NULL) m->pinned->last_ns = 0; /* frees the entry */
     m->pinned = p;
-    m->pinned_ns = now_ns;
     m->has_machine_id |= p->identified;
     if (p->identified) strcpy(m->machine_id, p->identity.machine_id);
     print_participant(p->identified ? "%s: publisher is %s\n"
@@ -324,8 +323,7 @@ static void keep(const abbe_v1_ModelState* state, dds_entity_t reader,
 }
 
 /* Which machine a publisher is. The pinned publisher is released if abbed behind it has become
-   another machine, or if another publisher of its identity was beside it when it was chosen: its
-   first Identity may have been a second old. */
+   another machine. */
 static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
                      dds_instance_handle_t writer) {
   struct machine* m = find_machine(identity->machine);
@@ -333,9 +331,7 @@ static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
   if (p == NULL) return;
   p->identity = *identity;
   p->identified = true;
-  if (m->pinned == p &&
-      (!m->has_machine_id || strcmp(m->machine_id, identity->machine_id) != 0 ||
-       (is_copied(identity) && now_in_ns() - m->pinned_ns < 1500 * millisecond_ns)))
+  if (m->pinned == p && (!m->has_machine_id || strcmp(m->machine_id, identity->machine_id) != 0))
     m->pinned = NULL;
   if (!is_pinned(m, p)) report_ignored_publisher(m, p);
 }

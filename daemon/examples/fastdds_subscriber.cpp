@@ -217,7 +217,7 @@ class Listener : public DataReaderListener {
         identity == nullptr
             ? machine.pin.heard(id, now)
             : machine.pin.identified(id, identity->machine_id(),
-                                     twin_of(identity->twin(), identity->twin_seen()), now);
+                                     twin_of(identity->twin(), identity->twin_seen(), name), now);
     const auto [found, is_new] = machine.publishers.try_emplace(id);
     if (is_new && former)
       found->second.delay = machine.publishers[*former].delay.for_next_publisher();

@@ -67,7 +67,8 @@ void Subscription::judge(const dds::Arrival& arrival, const dds::ParticipantId& 
   if (arrival.topic == Topic::Identity) {
     with<v1::Identity>(arrival, [&](v1::Identity&& identity) {
       verdict = pin_.identified(from, identity.machine_id(),
-                                dds::twin_of(identity.twin(), identity.twin_seen()), Clock::now());
+                                dds::twin_of(identity.twin(), identity.twin_seen(), machine_),
+                                Clock::now());
     });
   } else {
     verdict = pin_.heard(from, Clock::now());

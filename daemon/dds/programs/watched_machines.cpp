@@ -101,8 +101,9 @@ PublisherPin::Verdict WatchedMachines::judge(const Arrival& arrival, PublisherPi
   const auto now = WallClock::now();
   if (arrival.topic != Topic::Identity) return pin.heard(from, now);
   const auto identity = daemon::decode<v1::Identity>(arrival.payload);
-  return identity ? pin.identified(from, identity->machine_id(),
-                                   twin_of(identity->twin(), identity->twin_seen()), now)
+  return identity ? pin.identified(
+                        from, identity->machine_id(),
+                        twin_of(identity->twin(), identity->twin_seen(), identity->machine()), now)
                   : pin.heard(from, now);
 }
 

@@ -37,9 +37,9 @@ constexpr std::uint32_t kLivelinessWriter = 0x000200c2, kAuthenticationWriter = 
                         kKeysWriter = 0xff0202c3;
 /// Key hash and status info (disposed, unregistered) of a sample.
 constexpr std::uint16_t kKeyHash = 0x0070, kStatusInfo = 0x0071;
-/// Longest announcement: those of abbe have less than 1 kB, the keys of DDS Security some more. A
-/// stranger may announce thousands, with user data that is kept.
-constexpr std::size_t kLongestAnnouncement = 8192;
+/// Longest announcement: those of abbe have less than 1 kB, with a TypeObject several. A stranger may
+/// announce thousands, with user data that is kept.
+constexpr std::size_t kLongestAnnouncement = 16384;
 /// Parameter of a participant: how long it counts as alive without a message. Three times the
 /// longest interval of announcements that is usual (30 s): a participant that announced an endless
 /// lease, and left, would stay in memory.
@@ -106,9 +106,10 @@ std::optional<std::uint64_t> next_of(const Submessage& submessage, std::size_t a
 }
 
 /// Whether a reliable reader may keep `number` of the writer whose entity id is at `at`.
-bool is_near(const Submessage& submessage, std::size_t at, std::uint64_t number) {
+bool is_near(const Submessage& submessage, std::size_t at, std::uint64_t number,
+             std::uint64_t ahead = SequenceWindow::kAhead) {
   if (submessage.window == nullptr) return true;
-  return number < next_of(submessage, at).value_or(1) + SequenceWindow::kAhead;
+  return number < next_of(submessage, at).value_or(1) + ahead;
 }
 
 bool announces_endpoint(std::uint32_t writer) {
@@ -240,8 +241,9 @@ bool check_data(const Submessage& data) {
   }
   if (writer == kParticipantsWriter) return limit_lease(data);
   const bool users = is_users(writer);
+  const std::uint64_t ahead = users ? SequenceWindow::kAhead : SequenceWindow::kAnnouncementsAhead;
   if (data.window != nullptr && (!users || next_of(data, kWriterAt)) &&
-      !is_near(data, kWriterAt, data.reader().sequence_number(kNumberAt))) {
+      !is_near(data, kWriterAt, data.reader().sequence_number(kNumberAt), ahead)) {
     data.kind = kSkipped;
     return true;
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <tuple>
 #include <utility>
 
 #include "abbe/messages/cdr.hpp"
@@ -83,7 +84,9 @@ bool TwinWatch::has_id_of(const Claim& claim, const v1::Identity& own) {
 std::string TwinWatch::in_words(const v1::Identity& own) const {
   const std::pair<const ParticipantId, Claim>* shown = nullptr;
   std::size_t twins = 0;
-  const auto rank = [&own](const Claim& c) { return std::pair(!has_id_of(c, own), c.first); };
+  const auto rank = [&own](const Claim& c) {
+    return std::tuple(!has_id_of(c, own), c.machine != own.machine(), c.first);
+  };
   for (const auto& claim : claims_) {
     if (!is_twin(claim.second, own)) continue;
     ++twins;
@@ -92,7 +95,7 @@ std::string TwinWatch::in_words(const v1::Identity& own) const {
   if (shown == nullptr) return {};
   const auto& [id, claim] = *shown;
   auto text = has_id_of(claim, own)
-                  ? fmt::format("{}, as machine {},", kTwinOfSameId, printable(claim.machine))
+                  ? fmt::format("{}{},", kTwinOfSameId, printable(claim.machine))
                   : fmt::format("the same name, machine_id {},", printable(claim.machine_id));
   text += " from DDS participant " + text_of(id);
   if (twins > 1) text += fmt::format(" and {} more", twins - 1);

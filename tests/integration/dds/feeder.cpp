@@ -5,7 +5,7 @@
 // reports one. The first component of its vectors is the time at
 // which they were made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6. With ABBE_FEEDER_STALE in
 // its environment the state is STALE until SIGUSR1. ABBE_FEEDER_MACHINE_ID: its identity instead of
-// that of the sample messages; "none": no Identity is published, as by an earlier version.
+// one of its own; "none": no Identity is published, as by an earlier version.
 #include <signal.h>
 
 #include <cstdio>
@@ -33,8 +33,10 @@ v1::ModelState state(std::uint64_t sequence) {
   return state;
 }
 
-v1::Identity identity(std::uint64_t sequence) {
+/// Each machine has an identity of its own, that of test::kMachine is test::kMachineId.
+v1::Identity identity(std::uint64_t sequence, const std::string& machine) {
   auto identity = test::identity(sequence);
+  if (machine != test::kMachine) identity.machine_id(("id-of-" + machine).substr(0, 36));
   if (const char* const id = std::getenv("ABBE_FEEDER_MACHINE_ID")) identity.machine_id(id);
   return identity;
 }
@@ -51,7 +53,7 @@ class Feeder {
     link_.beat(now);
     report_twin();
     if (now >= next_state_) {
-      auto which = identity(++sequence_);
+      auto which = identity(++sequence_, machine_);
       which.twin(!link_.twin().empty());
       which.twin_seen(link_.twin());
       if (which.machine_id() != "none") send(Topic::Identity, which);

@@ -3,6 +3,8 @@
 //   dds_hostile_peer DOMAIN SEED            everything
 //   dds_hostile_peer DOMAIN SEED dispose    only samples that dispose or unregister an instance,
 //                                           with and without key
+//   dds_hostile_peer DOMAIN SEED numbers    only gaps of numbers far apart, and heartbeats that skip
+//                                           a million million numbers
 //   dds_hostile_peer DOMAIN SEED claims     80 participants, each with the Identity of a machine of
 //                                           its own, every second
 // It announces writers and readers of all topics of abbe under changing GUIDs, and sends DATA,
@@ -41,8 +43,8 @@ constexpr int kMostParticipants = 16;
 
 class HostilePeer {
  public:
-  HostilePeer(int domain, unsigned seed, bool disposes_only)
-      : domain_(domain), disposes_only_(disposes_only), random_(seed) {
+  HostilePeer(int domain, unsigned seed, std::string mode)
+      : domain_(domain), mode_(std::move(mode)), random_(seed) {
     fd_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     sockaddr_in own{};
     own.sin_family = AF_INET;
@@ -360,10 +362,24 @@ class HostilePeer {
     m.append({0, 0, 0, static_cast<std::uint8_t>(below(4))}).append(garbage(40)).end();
   }
 
+  /// Each number of a gap that is not the next one is kept by a reader.
+  Bytes numbers_message() {
+    constexpr std::int64_t kLength = 1000;
+    RtpsMessage m(prefix_);
+    for (int n = 0; n < 30; ++n) {
+      const std::int64_t start = 2 + std::int64_t{below(1'000'000'000)};
+      m.begin(0x08, 0).entity(0).entity(entity(below(daemon::kTopicCount), true));
+      m.number(start).number(start + kLength).u32(0).end();
+    }
+    constexpr std::int64_t kFar = std::int64_t{1} << 40;
+    if (chance(200)) m.heartbeat(entity(below(daemon::kTopicCount), true), kFar, kFar, ++count_);
+    return m.bytes();
+  }
   Bytes hostile_message() {
+    if (mode_ == "numbers") return numbers_message();
     RtpsMessage m(prefix_, chance(2) ? 0x0f : 0x10);
     for (unsigned n = 1 + below(4); n > 0; --n) {
-      switch (disposes_only_ ? 0 : below(16)) {
+      switch (mode_ == "dispose" ? 0 : below(16)) {
         case 0:
         case 1:
           dispose(m);
@@ -454,7 +470,7 @@ class HostilePeer {
                                                                 0xff0003c2, 0xff0101c2};
 
   int domain_, fd_ = -1;
-  bool disposes_only_;
+  std::string mode_;
   std::uint16_t port_ = 0;
   std::mt19937 random_;
   Prefix prefix_{};
@@ -473,7 +489,7 @@ int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   std::printf("seed %s\nstarted\n", argv[2]);
   HostilePeer peer(std::atoi(argv[1]), static_cast<unsigned>(std::atol(argv[2])),
-                   argc > 3 && std::string(argv[3]) == "dispose");
+                   argc > 3 ? argv[3] : "");
   const bool claims = argc > 3 && std::string(argv[3]) == "claims";
   for (;;) {
     if (claims)

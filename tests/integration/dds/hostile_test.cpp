@@ -147,5 +147,10 @@ TEST_F(HostilePeer, ThatOnlyDisposesInstancesEndsNoSubscriber) {
   expect_nothing_ends({ABBE_HOSTILE_PEER, domain_.text(), seed(), "dispose"}, 3s);
 }
 
+/// Fast DDS would keep 30,000 numbers of each message, and count to the heartbeat for hours.
+TEST_F(HostilePeer, ThatSendsFarNumbersNeitherTakesAllMemoryNorStopsASubscriber) {
+  expect_nothing_ends({ABBE_HOSTILE_PEER, domain_.text(), seed(), "numbers"}, 6s);
+}
+
 }  // namespace
 }  // namespace abbe::test

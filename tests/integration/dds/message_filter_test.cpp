@@ -334,6 +334,16 @@ TEST(MessageFilterOfNumbers, AHeartbeatSkipsNoMoreThanAFewMillionNumbers) {
   EXPECT_EQ(first_of(next), 4'000'000'000);
 }
 
+TEST(MessageFilterOfNumbers, SkipsAnAnnouncementFarAhead) {
+  SequenceWindow window;
+  for (const std::uint8_t number : {std::uint8_t{32}, std::uint8_t{33}}) {
+    Bytes message = announcement(kPublications, {kTopicName});
+    message[kBodyAt + 16] = number;
+    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    EXPECT_EQ(message[kKindAt], number == 32 ? 0x15 : 0x7f);
+  }
+}
+
 TEST(MessageFilterOfNumbers, AWriterBehindAnotherSourceIsAnother) {
   SequenceWindow window;
   window.sent(acknack(1'000'000));
@@ -383,8 +393,8 @@ TEST(MessageFilterInput, ShortensTheLeaseOfAParticipant) {
 }
 
 TEST(MessageFilterInput, SkipsALongAnnouncement) {
-  Bytes list{0, 3, 0, 0, 0x2c, 0, 0x20, 0x20};
-  list.resize(list.size() + 0x2020);
+  Bytes list{0, 3, 0, 0, 0x2c, 0, 0x20, 0x40};
+  list.resize(list.size() + 0x4020);
   list.insert(list.end(), {1, 0, 0, 0});
   Bytes message = data_message(kPublications, 5, 16, list);
   EXPECT_EQ(filter_message(message), message.size());

@@ -77,17 +77,17 @@ TEST_F(PublisherPinTest, ASubscriberWithAMachineIdPinsThisMachineOnly) {
 }
 
 TEST_F(PublisherPinTest, OfTwinsNoneIsPinnedUnlessTheMachineIdIsGiven) {
-  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameName, now), Verdict::Ambiguous);
-  EXPECT_EQ(pin.identified(kOther, kOtherMill, Twin::SameName, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::Other, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kOther, kOtherMill, Twin::Other, now), Verdict::Ambiguous);
   EXPECT_EQ(pin.pinned(), std::nullopt);
   PublisherPin given(kOtherMill);
-  EXPECT_EQ(given.identified(kFirst, kMill, Twin::SameName, now), Verdict::OtherMachine);
-  EXPECT_EQ(given.identified(kOther, kOtherMill, Twin::SameName, now), Verdict::NewlyPinned);
+  EXPECT_EQ(given.identified(kFirst, kMill, Twin::Other, now), Verdict::OtherMachine);
+  EXPECT_EQ(given.identified(kOther, kOtherMill, Twin::Other, now), Verdict::NewlyPinned);
 }
 
 TEST_F(PublisherPinTest, ATwinThatAppearsLaterDoesNotReleaseTheFirst) {
   send({kFirst}, 500ms);
-  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameName, now), Verdict::Pinned);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::Other, now), Verdict::Pinned);
 }
 
 TEST_F(PublisherPinTest, AParticipantThatStatesAnotherMachineIsNotUsedAnyMore) {
@@ -122,12 +122,6 @@ TEST_F(PublisherPinTest, OfTwoPublishersWithOneIdentityNoneIsChosen) {
   EXPECT_EQ(pin.identified(kFirst, kMill, Twin::None, now + 20s), Verdict::NewlyPinned);
 }
 
-TEST_F(PublisherPinTest, APublisherThatHadACopyBesideItWhenItWasChosenIsReleased) {
-  send({kFirst}, 500ms);
-  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Copied);
-  EXPECT_EQ(pin.pinned(), std::nullopt);
-}
-
 TEST_F(PublisherPinTest, ACopyThatAppearsLaterDoesNotReleaseTheFirst) {
   send({kFirst}, 2s);
   EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Pinned);
@@ -135,7 +129,7 @@ TEST_F(PublisherPinTest, ACopyThatAppearsLaterDoesNotReleaseTheFirst) {
 
 TEST_F(PublisherPinTest, ACopyThatTheMachineHasNotSeenIsSeenHere) {
   EXPECT_EQ(pin.identified(kFirst, "", Twin::None, now), Verdict::Unidentified);
-  EXPECT_EQ(pin.identified(kSecond, kMill, Twin::SameName, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kSecond, kMill, Twin::Other, now), Verdict::Ambiguous);
   EXPECT_EQ(pin.identified(kThird, kMill, Twin::None, now), Verdict::Copied);
   EXPECT_EQ(pin.identified(kThird, kMill, Twin::None, now + 3s), Verdict::NewlyPinned);
 }
@@ -168,7 +162,7 @@ TEST_F(PublisherPinTest, WithoutIdentityNoneIsPinnedIfAMachineIdWasGivenOrIsStat
   EXPECT_EQ(given.heard(kFirst, now), Verdict::Waiting);
   EXPECT_EQ(given.heard(kFirst, now + 60s), Verdict::Waiting);
   pin.heard(kFirst, now);
-  EXPECT_EQ(pin.identified(kOther, kOtherMill, Twin::SameName, now + 5s), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kOther, kOtherMill, Twin::Other, now + 5s), Verdict::Ambiguous);
   EXPECT_EQ(pin.heard(kFirst, now + 6s), Verdict::Waiting);
 }
 
@@ -182,9 +176,10 @@ TEST_F(PublisherPinTest, ASubscriberOfSlowTopicsAwaitsALongerSilence) {
 }
 
 TEST(TwinOfIdentity, IsKnownByHowTwinSeenBegins) {
-  EXPECT_EQ(twin_of(false, ""), Twin::None);
-  EXPECT_EQ(twin_of(true, "the same name, machine_id 4711"), Twin::SameName);
-  EXPECT_EQ(twin_of(true, "the same machine_id, as machine mill"), Twin::SameId);
+  EXPECT_EQ(twin_of(false, "", "mill"), Twin::None);
+  EXPECT_EQ(twin_of(true, "the same name, machine_id 4711, from", "mill"), Twin::Other);
+  EXPECT_EQ(twin_of(true, "the same machine_id, as machine mill, from", "mill"), Twin::SameId);
+  EXPECT_EQ(twin_of(true, "the same machine_id, as machine mill-b, from", "mill"), Twin::Other);
 }
 
 /// The subscriber was stopped: the time before its first sample is no silence of the publisher.

@@ -37,7 +37,9 @@ TEST_F(Twins, BothReportTheOtherUntilItEnds) {
 
 TEST_F(Twins, ACopiedIdentityIsReportedUnderAnyName) {
   start_feeder();
+  ::setenv("ABBE_FEEDER_MACHINE_ID", kMachineId, 1);
   const auto copy = feeder_of("vmc-4");
+  ::unsetenv("ABBE_FEEDER_MACHINE_ID");
   EXPECT_TRUE(feeder_->wait_for("twin the same machine_id, as machine vmc-4"))
       << feeder_->transcript();
   EXPECT_TRUE(copy->wait_for("twin the same machine_id, as machine vmc-3")) << copy->transcript();

@@ -25,7 +25,7 @@
 /// - A message of liveliness that is too short.
 ///
 /// Participant leases above 100 s are shortened: a stranger that announced an endless one, and
-/// left, would stay in memory. Announcements of more than 8 kB are skipped.
+/// left, would stay in memory. Announcements of more than 16 kB are skipped.
 ///
 /// The filter also drops messages with wrong lengths: a message passes only if its submessages
 /// follow each other as the standard requires, and its announcements have their parameters

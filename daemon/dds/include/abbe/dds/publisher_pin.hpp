@@ -48,16 +48,19 @@ using ParticipantId = std::array<std::uint8_t, 12>;
 /// The other publisher that a machine has seen, from the members twin and twin_seen of Identity.
 enum class Twin {
   None,
-  SameName,  ///< another machine of this name
-  SameId,    ///< another publisher of this machine_id
+  Other,   ///< another machine of this name, or this machine_id under another name
+  SameId,  ///< another publisher of this name and machine_id
 };
 
-/// How twin_seen begins for Twin::SameId.
-inline constexpr std::string_view kTwinOfSameId = "the same machine_id";
+/// How twin_seen begins if the other one has the same machine_id; its name and a comma follow.
+inline constexpr std::string_view kTwinOfSameId = "the same machine_id, as machine ";
 
-[[nodiscard]] inline Twin twin_of(bool twin, std::string_view twin_seen) {
+/// `machine`: the name in this Identity.
+[[nodiscard]] inline Twin twin_of(bool twin, std::string_view twin_seen,
+                                  const std::string& machine) {
   if (!twin) return Twin::None;
-  return twin_seen.substr(0, kTwinOfSameId.size()) == kTwinOfSameId ? Twin::SameId : Twin::SameName;
+  const std::string copy = std::string(kTwinOfSameId) + machine + ",";
+  return twin_seen.substr(0, copy.size()) == copy ? Twin::SameId : Twin::Other;
 }
 
 /// Create one object per machine.
@@ -81,9 +84,6 @@ class PublisherPin {
   /// Identity comes every second. A participant that has sent for kNoIdentity without one has none.
   /// One that has stated its identity within kPresent is there.
   static constexpr std::chrono::milliseconds kNoIdentity{5000}, kPresent{1500};
-  /// A pinned participant that sees another one of its identity within this time had it beside it
-  /// when it was chosen: its first Identity may have been a second old.
-  static constexpr std::chrono::milliseconds kChoice{1500};
   /// At most this many participants beside the pinned one are remembered. For a further one, that
   /// with the oldest last sample is forgotten.
   static constexpr std::size_t kMostOthers = 7;
@@ -118,8 +118,7 @@ class PublisherPin {
   /// Call it for every sample of the topic Identity.
   Verdict identified(const ParticipantId& from, const std::string& machine_id, Twin twin,
                      Instant now) {
-    const bool chosen_by_chance = twin == Twin::SameId && now - pinned_at_ < kChoice;
-    if (pinned_ == from && (machine_id != machine_id_ || chosen_by_chance)) pinned_.reset();
+    if (pinned_ == from && machine_id != machine_id_) pinned_.reset();
     if (pinned_ != from) find_or_add(from, now).states = Statement{machine_id, twin};
     return heard(from, now);
   }
@@ -190,7 +189,7 @@ class PublisherPin {
       if (machine_id.empty()) return Verdict::Unidentified;
       if (machine_id_ && machine_id != *machine_id_) return Verdict::OtherMachine;
       if (twin == Twin::SameId) return Verdict::Copied;
-      if (!machine_id_ && twin == Twin::SameName) return Verdict::Ambiguous;
+      if (!machine_id_ && twin == Twin::Other) return Verdict::Ambiguous;
     }
     if (other.foreign) return Verdict::Foreign;
     if (has_copy(other, now)) return Verdict::Copied;
@@ -213,7 +212,7 @@ class PublisherPin {
     if (next.states) machine_id_ = next.states->machine_id;
     std::erase_if(others_, [&](const Other& other) { return other.id == id; });
     pinned_ = id;
-    pinned_at_ = pinned_heard_ = now;
+    pinned_heard_ = now;
     return Verdict::NewlyPinned;
   }
 
@@ -228,7 +227,7 @@ class PublisherPin {
   std::chrono::milliseconds silence_;
   std::optional<std::string> machine_id_;
   std::optional<ParticipantId> pinned_;
-  Instant pinned_at_{}, pinned_heard_{};
+  Instant pinned_heard_{};
   std::vector<Other> others_;
 };
 

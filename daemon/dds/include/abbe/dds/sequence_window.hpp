@@ -22,6 +22,8 @@ class SequenceWindow {
   /// A reader asks for 256 numbers at a time, and abbe-dds has 128 samples a topic. Numbers that
   /// lie further ahead are not lost: the writer repeats them when they are asked for.
   static constexpr std::uint64_t kAhead = 1024;
+  /// The same for announcements and other messages of a participant, which are kept whole.
+  static constexpr std::uint64_t kAnnouncementsAhead = 32;
   /// Most numbers that one heartbeat may skip, some 20 ms of counting. Further ones follow with the
   /// next heartbeats: abbe-dds needs more than a week for so many.
   static constexpr std::uint64_t kLongestSkip = std::uint64_t{1} << 22;

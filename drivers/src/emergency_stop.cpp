@@ -53,7 +53,8 @@ EmergencyStop::~EmergencyStop() {
 }
 
 void EmergencyStop::set_socket(int fd) noexcept {
-  if (socket_.exchange(fd) != fd) await_senders();
+  const int before = socket_.exchange(fd);
+  if (before >= 0 && before != fd) await_senders();
 }
 
 /// Reads until the confirmation was seen. It may arrive in pieces, so the end of what was read

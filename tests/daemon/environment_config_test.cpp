@@ -53,10 +53,13 @@ std::string fault_text_of(const std::string& text) {
 
 TEST(SensorConfiguration, HoldsAValueUntilTheNextReadingOfEveryDevice) {
   const std::string slow = kScales + "period_s = 90\n";
-  EXPECT_THAT(fault_text_of(slow),
-              HasSubstr("sensors.hold_s: 60 s is shorter than period_s = 90 of \"rtd\": a value "
-                        "would not be held until the next reading; give at least 90, or 0"));
-  for (const std::string fits : {"hold_s = 90\n", "hold_s = 0\n", "check = false\n"})
+  EXPECT_EQ(config_of(slow).sensors.hold, std::chrono::seconds{135});
+  EXPECT_EQ(config_of(kScales).sensors.hold, std::chrono::seconds{60});
+  EXPECT_THAT(fault_text_of(slow + "[sensors]\nhold_s = 90\n"),
+              HasSubstr("sensors.hold_s: 90 s is shorter than 1.5 times period_s = 90 of \"rtd\": "
+                        "a value would not be held until the next reading; give at least 135, or "
+                        "0"));
+  for (const std::string fits : {"hold_s = 135\n", "hold_s = 0\n", "check = false\n"})
     EXPECT_EQ(fault_text_of(slow + "[sensors]\n" + fits), "") << fits;
 }
 

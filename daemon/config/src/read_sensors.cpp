@@ -80,26 +80,34 @@ SensorLimitConfig read_limit(Section& section, const Config& config) {
   return limit;
 }
 
-}  // namespace
+/// A refused reading is bridged by the last good value only if that is held until the next reading,
+/// which may come somewhat later than the period.
+constexpr double kHoldPerPeriod = 1.5;
 
-namespace {
-
-/// A refused reading is bridged by the last good value only if that is held until the next reading.
-void check_hold(Section& sensors, const Config& config) {
+/// Without hold_s: at least the default, and long enough for every device.
+void read_hold(Section& sensors, Config& out) {
   const auto seconds = [](std::chrono::nanoseconds t) {
     return std::chrono::duration<double>(t).count();
   };
-  const auto hold = config.sensors.hold;
-  if (!config.sensors.check || hold <= std::chrono::nanoseconds{0}) return;
-  for (const EnvironmentSource& device : environment_sources(config))
-    if (device.period > hold)
-      sensors.fault(
-          "hold_s",
-          fmt::format("{} s is shorter than period_s = {} of \"{}\": a value would not be "
-                      "held until the next reading; give at least {}, or 0: no value is "
-                      "held",
-                      seconds(hold), seconds(device.period), device.device,
-                      seconds(device.period)));
+  auto& hold = out.sensors.hold;
+  const bool given = sensors.has("hold_s");
+  sensors.get("hold_s", hold, kPlain, {0.0, 3600.0});
+  if (!out.sensors.check || hold <= std::chrono::nanoseconds{0}) return;
+
+  for (const EnvironmentSource& device : environment_sources(out)) {
+    const auto needed =
+        std::chrono::duration_cast<std::chrono::nanoseconds>(kHoldPerPeriod * device.period);
+    if (needed <= hold) continue;
+    if (given)
+      sensors.fault("hold_s",
+                    fmt::format("{} s is shorter than {} times period_s = {} of \"{}\": a value "
+                                "would not be held until the next reading; give at least {}, or 0: "
+                                "no value is held",
+                                seconds(hold), kHoldPerPeriod, seconds(device.period),
+                                device.device, seconds(needed)));
+    else
+      hold = needed;
+  }
 }
 
 }  // namespace
@@ -108,8 +116,7 @@ void read_sensors(ClassifiedSection& root, Config& out) {
   Section sensors = root.operation_table("sensors");
   SensorsConfig& config = out.sensors;
   sensors.get("check", config.check);
-  sensors.get("hold_s", config.hold, kPlain, {0.0, 3600.0});
-  check_hold(sensors, out);
+  read_hold(sensors, out);
   sensors.get("forget_s", config.forget, kPlain, {1.0, 86'400.0});
   sensors.get("start_spread_K", config.start_spread_K, kPlain, kPositive);
   // The air of a hall changes by some K per hour: a slower correction would never follow it.

@@ -83,7 +83,7 @@ void WatchedMachines::take(const Arrival& arrival) {
   const auto former = machine.pin.pinned();
   const auto verdict = judge(arrival, machine.pin);
   auto& publisher = machine.publisher(from);
-  keep(arrival, publisher);
+  keep(arrival, publisher, machine.pin.pinned() == from);
   if (verdict != Verdict::Pinned && verdict != Verdict::NewlyPinned) {
     keep_for_later(arrival, publisher);
     return report_ignored_publisher(name, machine, from, verdict);
@@ -208,7 +208,7 @@ bool WatchedMachines::alive(const Publisher* publisher) const {
          readers_.is_alive(*publisher->state_from);
 }
 
-void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
+void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher, bool pinned) {
   switch (arrival.topic) {
     case Topic::ModelState:
       return with<v1::ModelState>(arrival.payload, [&](auto& m) {
@@ -220,7 +220,7 @@ void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
       return with<v1::ErrorModel>(arrival.payload, [&](auto& m) { publisher.model.model(m); });
     case Topic::ErrorGrid:
       if (!options_.keep_grids ||
-          total([](const Publisher& p) { return p.model.kept_nodes(); }) >= kMostNodes)
+          (!pinned && total([](const Publisher& p) { return p.model.kept_nodes(); }) >= kMostNodes))
         return;
       return with<v1::ErrorGrid>(arrival.payload, [&](auto& m) { publisher.model.slice(m); });
     case Topic::Snapshot:
@@ -313,9 +313,10 @@ void WatchedMachines::report_ignored_publisher(const std::string& name, Machine&
         described(id), stated);
   if (verdict == Verdict::Copied)
     why = fmt::format(
-        "several publishers have machine_id {}: nothing is used; give the copy an identity of its "
-        "own (abbe machine identity new); publisher {}",
-        stated.empty() ? "none" : stated, described(id));
+        "several publishers have machine_id {}: {}; give the copy an identity of its own (abbe "
+        "machine identity new); publisher {}",
+        stated.empty() ? "none" : stated,
+        machine.pin.pinned() ? "the first one stays in use" : "nothing is used", described(id));
   if (verdict == Verdict::Unidentified)
     why = fmt::format("publisher {} has no machine_id: ignored; see Health of stream identity",
                       described(id));

@@ -110,7 +110,7 @@ class WatchedMachines {
   }
   /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
   /// them may be pinned next.
-  void keep(const Arrival& arrival, Publisher& publisher);
+  void keep(const Arrival& arrival, Publisher& publisher, bool pinned);
   /// Shows a sample of the pinned publisher, after keep().
   void show(const Arrival& arrival, const std::string& name, Machine& machine,
             const Publisher& publisher);

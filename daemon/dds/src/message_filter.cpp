@@ -234,12 +234,12 @@ bool check_data(const Submessage& data) {
   constexpr std::size_t kShortestLivelinessPayload = 20;  // encapsulation, GUID prefix, kind
   if (data.body.size() < kShortest || !is_countable(data, kNumberAt)) return false;
   const std::uint32_t writer = entity_id(data.body, kWriterAt);
-  const bool announces = writer == kParticipantsWriter || announces_endpoint(writer);
-  if (announces && data.body.size() > kLongestAnnouncement) {
+  const bool is_long = data.body.size() > kLongestAnnouncement;
+  if (writer == kParticipantsWriter) {
+    if (!is_long) return limit_lease(data);
     data.kind = kSkipped;
     return true;
   }
-  if (writer == kParticipantsWriter) return limit_lease(data);
   const bool users = is_users(writer);
   const std::uint64_t ahead = users ? SequenceWindow::kAhead : SequenceWindow::kAnnouncementsAhead;
   if (data.window != nullptr && (!users || next_of(data, kWriterAt)) &&
@@ -247,7 +247,11 @@ bool check_data(const Submessage& data) {
     data.kind = kSkipped;
     return true;
   }
-  if (announces_endpoint(writer)) return blank_types(data);
+  if (announces_endpoint(writer)) {
+    if (!is_long) return blank_types(data);
+    replace_by_gap(data);  // skipped, it would keep the reader from all later announcements
+    return true;
+  }
 
   const auto layout = read_data(data, users && !data.is_signed);
   if (!layout) return false;
@@ -270,15 +274,19 @@ bool check_data(const Submessage& data) {
 /// Only the messages of DDS Security before it encrypts may be fragments: a message of abbe fits
 /// into one DATA submessage, and Fast DDS checks fragments insufficiently: without a payload behind
 /// their inline QoS it frees memory that is not its own. A fragment of an announcement cannot be
-/// checked alone.
+/// checked alone; a GAP of its number lets the reader go on to later announcements.
 void check_fragment(const Submessage& fragment) {
-  constexpr std::size_t kWriterAt = 8, kFragmentsAt = 20, kShortest = 32;
+  constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kFragmentsAt = 20, kShortest = 32;
   const Bytes body = fragment.body;
   fragment.kind = kSkipped;
   if (body.size() < kShortest) return;
   const std::uint32_t writer = entity_id(body, kWriterAt);
+  if (!is_countable(fragment, kNumberAt)) return;
+  if (announces_endpoint(writer) && !fragment.is_signed &&
+      is_near(fragment, kWriterAt, fragment.reader().sequence_number(kNumberAt),
+              SequenceWindow::kAnnouncementsAhead))
+    replace_by_gap(fragment);
   if (writer != kAuthenticationWriter && writer != kKeysWriter) return;
-  if (!is_countable(fragment, 12)) return;
   constexpr std::uint16_t kToPayload = kShortest - kToInlineQos;
   const Reader reader = fragment.reader();
   if (fragment.has(kInlineQos | kWithData) || reader.u16(2) != kToPayload ||
@@ -316,10 +324,12 @@ void limit_heartbeat(const Submessage& heartbeat) {
     return;
   }
   if (heartbeat.window == nullptr || heartbeat.is_signed) return;
-  const std::uint64_t farthest =
-      next_of(heartbeat, kWriterAt).value_or(1) + SequenceWindow::kLongestSkip;
+  const std::uint64_t next = next_of(heartbeat, kWriterAt).value_or(1);
   Reader reader = heartbeat.reader();
-  if (reader.sequence_number(kFirstAt) > farthest) reader.put_sequence_number(kFirstAt, farthest);
+  const std::uint64_t first = reader.sequence_number(kFirstAt);
+  if (first <= next) return;
+  const std::uint64_t allowed = heartbeat.window->take_skip(first - next);
+  if (allowed < first - next) reader.put_sequence_number(kFirstAt, next + allowed);
 }
 
 /// Changes one submessage so that Fast DDS can read it. False: the message must be dropped.

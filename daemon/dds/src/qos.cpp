@@ -22,6 +22,7 @@ constexpr int kMostInstances = 128;
 /// announces ever more of them would take all memory.
 constexpr std::size_t kMostMatches = 512;
 constexpr int kInstancesAtStart = 4;
+constexpr int kKeptOfAnInstance = 4;
 
 bool is_durable(daemon::Topic topic) {
   return daemon::traits(topic).kind == daemon::TopicTraits::Kind::Durable;
@@ -65,8 +66,12 @@ DataWriterQos writer_qos(daemon::Topic topic) {
 DataReaderQos reader_qos(daemon::Topic topic) {
   DataReaderQos qos;
   set_common(topic, qos);
+  // Two streams of a machine may have one instance: both must stay until they are taken.
+  const int depth = is_durable(topic) ? kKeptOfAnInstance : 1;
+  qos.history().depth = depth;
+  qos.resource_limits().max_samples_per_instance = depth;
   // Never full: a received sample has one of kReceivedInstances instances, whoever sends it.
-  qos.resource_limits().max_samples = kReceivedInstances;
+  qos.resource_limits().max_samples = kReceivedInstances * depth;
   qos.resource_limits().max_instances = kReceivedInstances;
   // Each sample takes the memory that it needs: strangers may fill all places.
   qos.endpoint().history_memory_policy =

@@ -54,7 +54,10 @@ class AliveWriters final : public fast::DataReaderListener {
   void heard(const WriterId& writer, const Time& arrived) {
     const std::lock_guard lock(mutex_);
     const auto lost = lost_at_.find(writer);
-    if (lost == lost_at_.end() || lost->second < arrived) alive_.insert(writer);
+    if (lost != lost_at_.end() && !(lost->second < arrived)) return;
+    if (lost != lost_at_.end()) lost_at_.erase(lost);
+    if (alive_.size() >= kMostAlive) alive_.clear();  // each is known again with its next sample
+    alive_.insert(writer);
   }
 
  private:
@@ -79,10 +82,10 @@ class AliveWriters final : public fast::DataReaderListener {
     constexpr std::size_t kMostLosses = 1024;
     if (lost_at_.size() <= kMostLosses) return;
     const auto earlier = [](const auto& a, const auto& b) { return a.second < b.second; };
-    const auto oldest = std::ranges::min_element(lost_at_, earlier);
-    alive_.erase(oldest->first);  // if heard() added it: that sample had arrived before
-    lost_at_.erase(oldest);
+    lost_at_.erase(std::ranges::min_element(lost_at_, earlier));
   }
+
+  static constexpr std::size_t kMostAlive = 16384;  ///< more than there are matches
 
   mutable std::mutex mutex_;
   std::set<WriterId> alive_;

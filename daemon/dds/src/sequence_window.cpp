@@ -47,4 +47,17 @@ std::optional<std::uint64_t> SequenceWindow::next_of(const WriterGuid& writer) c
   return found == next_.end() ? std::nullopt : std::optional{found->second};
 }
 
+std::uint64_t SequenceWindow::take_skip(std::uint64_t wanted) const {
+  if (wanted <= kShortSkip) return wanted;
+  const auto now = std::chrono::steady_clock::now();
+  const std::lock_guard lock(mutex_);
+  if (now - skips_since_ >= std::chrono::seconds{1}) {
+    skips_since_ = now;
+    skips_left_ = kLongestSkip;
+  }
+  const std::uint64_t taken = std::min(wanted, skips_left_);
+  skips_left_ -= taken;
+  return std::max(taken, kShortSkip);
+}
+
 }  // namespace abbe::dds

@@ -25,6 +25,10 @@ nanoseconds since_epoch(protocol::HostTime t) {
   return t.time_since_epoch();
 }
 
+bool comparable(nanoseconds a, nanoseconds b) {
+  return (a > b ? a - b : b - a) <= kComparableFor;
+}
+
 }  // namespace
 
 SensorChecks::SensorChecks(SensorCheckOptions options) : start_spread_K_(options.start_spread_K) {
@@ -88,19 +92,18 @@ void SensorChecks::judge_by_twin(Sensor& sensor) {
   if (twin == nullptr) return;
   Sensor& first = sensor.options.place < twin->options.place ? sensor : *twin;
   const double most = sensor.options.most_twin_difference;
-  const auto apart = sensor.at > twin->at ? sensor.at - twin->at : twin->at - sensor.at;
-  const bool comparable =
-      std::isfinite(sensor.usable) && std::isfinite(twin->usable) && apart <= kComparableFor;
+  const bool both = std::isfinite(sensor.usable) && std::isfinite(twin->usable) &&
+                    comparable(sensor.at, twin->at);
   // Until both are in use one comparison is enough: nothing wrong must be used first.
   const bool in_use = std::isfinite(sensor.held.value) && std::isfinite(twin->held.value);
   const int confirmed = in_use ? 2 : 1;
 
   // In one sample the pair is compared once.
   const bool compared = sensor.at == twin->at && &sensor != &first;
-  if (comparable && !compared) {
+  if (both && !compared) {
     (void)calib::twins_differ(first.twin_differs, sensor.usable, twin->usable, most);
     first.twins_doubted = first.twin_differs >= confirmed;
-  } else if (!comparable) {
+  } else if (!both) {
     first.twin_differs = 0;
   }
 
@@ -187,7 +190,9 @@ Result<void> SensorChecks::check_acceptance(std::string_view name) const {
   }
   const auto twin = std::ranges::find_if(
       sensors_, [&](const Sensor& other) { return other.options.place == sensor->options.twin; });
-  if (twin == sensors_.end() || twin->doubt != SensorDoubt::Twin) return {};  // silent
+  const bool silent = twin == sensors_.end() || twin->doubt != SensorDoubt::Twin ||
+                      !comparable(sensor->at, twin->at);
+  if (silent) return {};
   return refused(
       fmt::format("it and its twin {} still differ: repair the wrong one, or remove "
                   "`twin` from [[sensors.limit]]",

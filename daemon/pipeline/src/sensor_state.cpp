@@ -107,6 +107,11 @@ Result<void> SensorChecks::go_on(const RecordingAttachment& attachment) {
         s.reading = double_of(j.at("reading"));
         s.lowest = double_of(j.at("lowest"));
         s.highest = double_of(j.at("highest"));
+        if (!s.options.twin) {  // the configuration may have had one
+          s.twin_differs = 0;
+          s.twins_doubted = false;
+          if (s.doubt == calib::SensorDoubt::Twin) s.doubt = calib::SensorDoubt::None;
+        }
       }
     }
     return {};

@@ -416,7 +416,8 @@ struct Abbed::State {
     const auto file = sensor_state_file(config.daemon.data_dir);
     std::error_code failed;
     remove_half_written(file);
-    if (checked.sensors.empty() || !std::filesystem::exists(file, failed)) return std::nullopt;
+    if (checked.sensors.empty()) return std::nullopt;
+    if (!std::filesystem::exists(file, failed) && !failed) return std::nullopt;
     const auto text = read_regular_file(file);
     auto state = text ? left_sensor_state(*text, checked, sensor_clock())
                       : Result<RecordingAttachment>{tl::unexpected(text.error())};

@@ -188,7 +188,7 @@ class PublisherPin {
       const auto& [machine_id, twin] = *other.states;
       if (machine_id.empty()) return Verdict::Unidentified;
       if (machine_id_ && machine_id != *machine_id_) return Verdict::OtherMachine;
-      if (twin == Twin::SameId) return Verdict::Copied;
+      if (twin == Twin::SameId) return other.foreign ? Verdict::Foreign : Verdict::Copied;
       if (!machine_id_ && twin == Twin::Other) return Verdict::Ambiguous;
     }
     if (other.foreign) return Verdict::Foreign;

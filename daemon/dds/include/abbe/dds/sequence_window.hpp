@@ -5,6 +5,7 @@
 /// each ACKNACK which number it waits for. Thread-safe.
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -24,9 +25,12 @@ class SequenceWindow {
   static constexpr std::uint64_t kAhead = 1024;
   /// The same for announcements and other messages of a participant, which are kept whole.
   static constexpr std::uint64_t kAnnouncementsAhead = 32;
-  /// Most numbers that one heartbeat may skip, some 20 ms of counting. Further ones follow with the
-  /// next heartbeats: abbe-dds needs more than a week for so many.
+  /// Most numbers that the heartbeats of all writers may skip in a second, some 20 ms of counting.
+  /// Further ones follow with the next heartbeats. With 15 devices abbe-dds writes so many samples
+  /// of Health in three days.
   static constexpr std::uint64_t kLongestSkip = std::uint64_t{1} << 22;
+  /// So many numbers a heartbeat may skip always: those of lost samples.
+  static constexpr std::uint64_t kShortSkip = 1024;
   /// Of further writers those that were first asked longest ago are forgotten, until they are asked
   /// again.
   static constexpr std::size_t kMostWriters = 16384;
@@ -38,8 +42,16 @@ class SequenceWindow {
   /// because it is a best-effort writer.
   [[nodiscard]] std::optional<std::uint64_t> next_of(const WriterGuid& writer) const;
 
+  /// How many of `wanted` numbers a heartbeat may skip now.
+  [[nodiscard]] std::uint64_t take_skip(std::uint64_t wanted) const;
+
  private:
+  using Instant = std::chrono::steady_clock::time_point;
+
   mutable std::mutex mutex_;
+  mutable std::uint64_t skips_left_ =
+      kLongestSkip;  ///< until the second since skips_since_ is over
+  mutable Instant skips_since_{};
   std::map<WriterGuid, std::uint64_t> next_;
   std::deque<WriterGuid> order_;  ///< of next_, the oldest entry first
 };

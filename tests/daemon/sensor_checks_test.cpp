@@ -242,6 +242,38 @@ TEST_F(SensorChecksTest, AcceptOneOfATwinOnlyIfTheOtherIsSilent) {
   EXPECT_NEAR(used_C(22.0, std::nan("")), 22.0, 1e-9);
 }
 
+/// As a module that is dead: its device sends no sample at all.
+TEST_F(SensorChecksTest, AcceptOneOfATwinWhoseOtherSendsNothing) {
+  start(kTwin);
+  settle();
+  drift_apart();
+  const auto read_alone = [this](double scale_x_C) {
+    EnvironmentSample s;
+    s.head.time = now_ += 1s;
+    s.temperature_K[0] = scale_x_C + kIce_K;
+    return checks_->checked(s, protocol::temperature_bit(0)).sample.temperature_K[0] - kIce_K;
+  };
+  for (int i = 0; i < 50; ++i) (void)read_alone(22.0);
+  EXPECT_THAT(checks_->check_acceptance("scale_x").error().text, HasSubstr("still differ"));
+  for (int i = 0; i < 20; ++i) (void)read_alone(22.0);
+  ASSERT_TRUE(checks_->check_acceptance("scale_x"));
+  checks_->accept("scale_x");
+  (void)read_alone(22.0);
+  EXPECT_NEAR(read_alone(22.0), 22.0, 1e-9);
+}
+
+TEST_F(SensorChecksTest, DoNotDoubtATwinThatIsNoTwinAnyMoreAfterARestart) {
+  start(kTwin);
+  settle();
+  drift_apart();
+  ASSERT_THAT(checks_->findings(), SizeIs(2));
+  const auto left = checks_->to_attachment();
+  start();  // the person has removed `twin`
+  ASSERT_TRUE(checks_->go_on(left));
+  EXPECT_THAT(checks_->findings(), IsEmpty());
+  EXPECT_NEAR(used_C(22.0), 22.0, 1e-9);
+}
+
 TEST_F(SensorChecksTest, KnowTheirDoubtsAfterARestart) {
   using std::chrono::hours;
   start();

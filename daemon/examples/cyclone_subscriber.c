@@ -160,6 +160,16 @@ static bool is_copied(const abbe_v1_Identity* identity) {
   return identity->twin && strncmp(identity->twin_seen, copy, strlen(copy)) == 0;
 }
 
+/* True if a foreign publisher that is there states the identity of `p`: it is then the copy that `p`,
+   the restarted publisher, has seen. */
+static bool is_of_foreign(const struct machine* m, const struct publisher* p, int64_t now_ns) {
+  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o)
+    if (o->foreign && o->last_ns != 0 && now_ns - o->last_ns < 1500 * millisecond_ns &&
+        o->identified && strcmp(o->identity.machine_id, p->identity.machine_id) == 0)
+      return true;
+  return false;
+}
+
 /* True if another publisher that is neither pinned nor foreign states the same identity as `p`, or
    like `p` none. */
 static bool has_copy(const struct machine* m, const struct publisher* p, int64_t now_ns) {
@@ -196,7 +206,8 @@ static bool may_be_pinned(struct machine* m, struct publisher* p, int64_t now_ns
     p->ignored_because = "%s: without a machine_id, publisher %s is ignored\n";
   else if (m->has_machine_id && strcmp(m->machine_id, p->identity.machine_id) != 0)
     p->ignored_because = "%s: another machine of this name, publisher %s is ignored\n";
-  else if (is_copied(&p->identity) || (!p->foreign && has_copy(m, p, now_ns)))
+  else if ((is_copied(&p->identity) && !is_of_foreign(m, p, now_ns)) ||
+           (!p->foreign && has_copy(m, p, now_ns)))
     p->ignored_because = "%s: one of several with one identity, publisher %s is ignored\n";
   else if (!m->has_machine_id && p->identity.twin)
     p->ignored_because = "%s: one of several machines of this name, publisher %s is ignored\n";

@@ -127,6 +127,14 @@ TEST_F(PublisherPinTest, ACopyThatAppearsLaterDoesNotReleaseTheFirst) {
   EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Pinned);
 }
 
+TEST_F(PublisherPinTest, ARestartedPublisherThatSeesTheForeignCopyIsPinned) {
+  send({kFirst, kSecond}, 1s);
+  ASSERT_EQ(pin.identified(kSecond, kMill, Twin::SameId, now), Verdict::Foreign);
+  (void)pin.identified(kThird, kMill, Twin::SameId, now);
+  EXPECT_EQ(send({kThird, kSecond}, 2s), Verdict::Foreign) << "of the copy, which sent last";
+  EXPECT_EQ(pin.pinned(), kThird);
+}
+
 TEST_F(PublisherPinTest, ACopyThatTheMachineHasNotSeenIsSeenHere) {
   EXPECT_EQ(pin.identified(kFirst, "", Twin::None, now), Verdict::Unidentified);
   EXPECT_EQ(pin.identified(kSecond, kMill, Twin::Other, now), Verdict::Ambiguous);

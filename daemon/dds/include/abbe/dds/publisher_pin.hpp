@@ -188,12 +188,20 @@ class PublisherPin {
       const auto& [machine_id, twin] = *other.states;
       if (machine_id.empty()) return Verdict::Unidentified;
       if (machine_id_ && machine_id != *machine_id_) return Verdict::OtherMachine;
-      if (twin == Twin::SameId) return other.foreign ? Verdict::Foreign : Verdict::Copied;
+      if (twin == Twin::SameId && !is_of_foreign(machine_id, now)) return Verdict::Copied;
       if (!machine_id_ && twin == Twin::Other) return Verdict::Ambiguous;
     }
     if (other.foreign) return Verdict::Foreign;
     if (has_copy(other, now)) return Verdict::Copied;
     return std::nullopt;
+  }
+
+  /// Whether a foreign participant that is there states this identity: it is then the copy that the
+  /// restarted publisher sees.
+  [[nodiscard]] bool is_of_foreign(const std::string& machine_id, Instant now) const {
+    return std::ranges::any_of(others_, [&](const Other& o) {
+      return o.foreign && o.states && o.states->machine_id == machine_id && now - o.last < kPresent;
+    });
   }
 
   /// Whether another participant that is not pinned, nor foreign to the pinned one, has the same

@@ -98,7 +98,7 @@ abbe::daemon::Result<abbe::daemon::Config> configuration_of(const std::string& f
   const auto passed_on =
       std::filesystem::path{credentials != nullptr ? credentials : ""} / "abbed.toml";
   std::error_code error;
-  if (credentials == nullptr || !std::filesystem::exists(passed_on, error))
+  if (credentials == nullptr || (!std::filesystem::exists(passed_on, error) && !error))
     return abbe::daemon::load_config(file);
   const auto text = abbe::daemon::read_regular_file(passed_on);
   if (!text) return tl::make_unexpected(text.error());

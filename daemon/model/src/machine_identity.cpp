@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/uuid/random_generator.hpp>
+#include <boost/uuid/uuid_io.hpp>
 #include <cctype>
 #include <fstream>
 #include <map>
@@ -54,8 +56,14 @@ bool is_built_in(const fs::path& interface) {
   return fs::read_symlink(interface / "device" / "subsystem", none).filename() != "usb";
 }
 
+/// From getrandom(2): abbed.service hides /proc/sys, where the kernel offers one. Empty: the kernel
+/// gives no random numbers.
 std::string random_uuid() {
-  return first_word_of("/proc/sys/kernel/random/uuid");
+  try {
+    return boost::uuids::to_string(boost::uuids::random_generator_pure{}());
+  } catch (const boost::uuids::entropy_error&) {
+    return {};
+  }
 }
 
 bool is_uuid(const std::string& text) {
@@ -159,7 +167,7 @@ Result<MachineIdentity> new_identity(const ComputerMarks& here, std::vector<Iden
                                      IdentityEvent event) {
   event.machine_id = random_uuid();
   if (!is_uuid(event.machine_id))
-    return fail(ErrorCode::Io, "/proc/sys/kernel/random/uuid: cannot be read");
+    return fail(ErrorCode::Io, "no identity can be made: the kernel gives no random numbers");
   MachineIdentity identity{
       .machine_id = event.machine_id, .computer = here, .events = std::move(events)};
   identity.events.push_back(std::move(event));

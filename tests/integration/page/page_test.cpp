@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "abbe/base/file_descriptor.hpp"
+#include "abbe/config/config.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/web/web_users.hpp"
 #include "bar_run.hpp"
@@ -133,13 +134,16 @@ struct PageOnTheFly : Page<Spine> {
 
   /// Half as fast as other tests: Chromium without a graphics card draws few pictures in a second.
   static constexpr int kSpeed = ABBE_SPINE_SPEED / 2;
-  /// Accepted models of these seeds; the first one is active. Before abbed starts.
-  void add_models(const std::vector<unsigned>& seeds) const {
+  /// Accepted models of these seeds; the first one is active. Without `machine_hash` they are of
+  /// another machine configuration.
+  void add_models(const std::vector<unsigned>& seeds, const std::string& machine_hash = {}) const {
     auto store = daemon::ModelStore::open(file("data/models"));
     ASSERT_TRUE(store) << store.error().text;
     const daemon::StoreActor actor{.who = "test", .why = "", .when = {}};
     for (const unsigned seed : seeds) {
-      const auto added = store->add(daemon::test::synthetic_document(seed), true, {}, actor);
+      auto document = daemon::test::synthetic_document(seed);
+      if (!machine_hash.empty()) document.machine_hash = machine_hash;
+      const auto added = store->add(document, true, {}, actor);
       ASSERT_TRUE(added) << added.error().text;
       if (seed == seeds.front()) {
         ASSERT_TRUE(store->activate(*added, actor));
@@ -216,8 +220,10 @@ TEST_F(PageOnTheFly, ComparesTwoModelsAndAsksBeforeAChange) {
 }
 
 TEST_F(PageOnTheFly, OpenViewsShowDrift) {
-  ASSERT_NO_FATAL_FAILURE(add_models({3}));
   ASSERT_NO_FATAL_FAILURE(start_everything());
+  const auto config = daemon::load_config(file("abbed.toml"));
+  ASSERT_TRUE(config) << config.error().text;
+  ASSERT_NO_FATAL_FAILURE(add_models({3}, daemon::machine_hash(*config)));
   browse("drift.mjs");
   ASSERT_TRUE(browser_prints("GREEN")) << browser_->out() << browser_->err();
   find_drift("EXX by 4 um");

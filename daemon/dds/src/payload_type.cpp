@@ -110,7 +110,7 @@ bool PayloadType::getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*
   const auto& payload = *static_cast<const Payload*>(data);
   const auto key = daemon::payload_key(topic_, payload.bytes);
   // Fast DDS 2.9 aborts in a reader that gets a sample without key hash whose key cannot be read.
-  // All malformed payloads are one instance; whoever decodes them refuses them.
+  // All malformed payloads are one instance; decoding refuses them.
   if (payload.received) {
     *handle = key ? received_instance(key->machine, key->number.value_or(0), key->text.value_or(""))
                   : received_instance("", 0, "");

@@ -70,7 +70,7 @@ DataReaderQos reader_qos(daemon::Topic topic) {
   const int depth = is_durable(topic) ? kKeptOfAnInstance : 1;
   qos.history().depth = depth;
   qos.resource_limits().max_samples_per_instance = depth;
-  // Never full: a received sample has one of kReceivedInstances instances, whoever sends it.
+  // Never full: a sample of any sender has one of kReceivedInstances instances.
   qos.resource_limits().max_samples = kReceivedInstances * depth;
   qos.resource_limits().max_instances = kReceivedInstances;
   // Each sample takes the memory that it needs: strangers may fill all places.

@@ -22,7 +22,6 @@ constexpr int kMostInstances = 128;
 /// announces ever more of them would take all memory.
 constexpr std::size_t kMostMatches = 512;
 constexpr int kInstancesAtStart = 4;
-constexpr int kKeptOfAnInstance = 4;
 
 bool is_durable(daemon::Topic topic) {
   return daemon::traits(topic).kind == daemon::TopicTraits::Kind::Durable;
@@ -66,8 +65,9 @@ DataWriterQos writer_qos(daemon::Topic topic) {
 DataReaderQos reader_qos(daemon::Topic topic) {
   DataReaderQos qos;
   set_common(topic, qos);
-  // Two streams of a machine may have one instance: both must stay until they are taken.
-  const int depth = is_durable(topic) ? kKeptOfAnInstance : 1;
+  // Two streams of a machine may have one instance: both must stay until they are taken. Not for
+  // the other topics: strangers may fill all places with 64 kB each.
+  const int depth = topic == daemon::Topic::Health ? 2 : 1;
   qos.history().depth = depth;
   qos.resource_limits().max_samples_per_instance = depth;
   // Never full: a sample of any sender has one of kReceivedInstances instances.

@@ -151,9 +151,10 @@ std::optional<DataLayout> read_data(const Submessage& data, bool users) {
   return layout;
 }
 
-/// Replaces the ids of the type parameters by an unused id. False if the announcement does not
-/// conform to the standard: the message must be dropped.
-bool blank_types(const Submessage& data) {
+/// Calls change(list, id, offset of the id) for every parameter of an announcement. False if it does
+/// not conform to the standard: the message must be dropped.
+template <class Change>
+bool change_announcement(const Submessage& data, Change change) {
   const Bytes body = data.body;
   const auto layout = read_data(data, false);
   if (!layout) return false;
@@ -162,36 +163,29 @@ bool blank_types(const Submessage& data) {
   if (at + 4 > body.size()) return false;
   const bool little_endian = (body[at + 1] & 1) != 0;  // PL_CDR_LE is 00 03, PL_CDR_BE is 00 02
   Reader list(body, little_endian);
+  return walk_parameters(list, at + 4,
+                         [&](std::uint16_t id, std::size_t offset) { change(list, id, offset); })
+      .has_value();
+}
 
-  const auto end = walk_parameters(list, at + 4, [&list](std::uint16_t id, std::size_t offset) {
+/// Replaces the ids of the type parameters by an unused id. False as above.
+bool blank_types(const Submessage& data) {
+  return change_announcement(data, [](Reader& list, std::uint16_t id, std::size_t offset) {
     if (std::ranges::find(kTypeParameters, id) != kTypeParameters.end())
       list.put_u16(offset, kUnusedParameterId);
   });
-
-  return end.has_value();
 }
 
-/// Shortens leases. False if the announcement does not conform to the standard: the message must be
-/// dropped.
+/// Shortens leases. False as above.
 bool limit_lease(const Submessage& data) {
   constexpr std::size_t kToValue = 4, kLeaseBytes = 8;  // seconds, fraction
-  const Bytes body = data.body;
-  const auto layout = read_data(data, false);
-  if (!layout) return false;
-  const std::size_t at = layout->payload;
-  if (!data.has(kWithData | kWithKey)) return true;
-  if (at + 4 > body.size()) return false;
-  Reader list(body, (body[at + 1] & 1) != 0);
-
-  const auto end = walk_parameters(list, at + 4, [&list](std::uint16_t id, std::size_t offset) {
+  return change_announcement(data, [](Reader& list, std::uint16_t id, std::size_t offset) {
     if (id != kParticipantLease || list.u16(offset + 2) < kLeaseBytes) return;
     // Unsigned: negative numbers, which stand for an endless lease, are large.
     if (list.u32(offset + kToValue) < kLongestLease_s) return;
     list.put_u32(offset + kToValue, kLongestLease_s);
     list.put_u32(offset + kToValue + 4, 0);
   });
-
-  return end.has_value();
 }
 
 /// Replaces a DATA submessage by a GAP of its sequence number: a reliable reader counts the sample

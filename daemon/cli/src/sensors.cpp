@@ -44,8 +44,8 @@ void add_sensors(CLI::App& parent, int& exit) {
   auto* command = group->add_subcommand(
       "accept",
       "State that a sensor is right whose readings are refused since a jump, or because they are "
-      "far\nfrom the other sensors: it begins anew. First compare it with a thermometer. Refused "
-      "while a\ncalibration takes readings, and for a sensor without a usable reading.");
+      "far\nfrom the other sensors: its history is discarded. First compare it with a thermometer. "
+      "Refused while\na calibration takes readings, and for a sensor without a usable reading.");
   add_socket_options(*command, arguments->where);
   command->add_option("sensor", arguments->sensor, "name of the sensor, as in `abbe status`")
       ->required();

@@ -410,7 +410,7 @@ struct Abbed::State {
             .speed = config.daemon.speed};
   }
 
-  /// The state of the sensors in the earlier run; nullopt: they begin anew.
+  /// The state of the sensors in the earlier run; nullopt: they start without one.
   std::optional<RecordingAttachment> sensors_left() {
     const auto checked = sensor_check_options(config);
     const auto file = sensor_state_file(config.daemon.data_dir);

@@ -74,7 +74,7 @@ struct MachineIdentity {
 
 /// The models that neither a person nor the gate activated after the renewal, sorted: they are of the
 /// machine from which the data folder was copied. A roll-back accepts no model. `history`: all events
-/// of the store. Where these are not those of the renewal (the store was made anew), dates decide.
+/// of the store. Where these are not those of the renewal (the store was made again), dates decide.
 [[nodiscard]] std::vector<std::string> models_of_other_machine(const MachineIdentity& identity,
                                                                std::span<const StoreEvent> history);
 /// The machine_id when model `id` was added to the store; nullopt: the store has no such event.

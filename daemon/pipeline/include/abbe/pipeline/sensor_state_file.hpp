@@ -1,7 +1,7 @@
 #pragma once
 /// State of the checks of the sensors that survives a restart of abbed: DATA_DIR/sensor-state.json.
 /// A restart is a gap in the readings and no more: a sensor that jumped before it stays refused, and
-/// after forget_s without a reading a sensor begins anew, as without a restart. Times are carried
+/// after forget_s without a reading a sensor has no history, as without a restart. Times are carried
 /// over by the wall clock, so that a restart of the computer changes nothing either. The file may be
 /// seconds old without harm. Not for the RT path.
 

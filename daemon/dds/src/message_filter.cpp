@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/dds/fragment_joiner.hpp"
+#include "announced_values.hpp"
 #include "rtps_fields.hpp"
 
 namespace abbe::dds {
@@ -45,10 +47,11 @@ constexpr std::size_t kLongestAnnouncement = 16384;
 /// lease, and left, would stay in memory.
 constexpr std::uint16_t kParticipantLease = 0x0002;
 constexpr std::uint32_t kLongestLease_s = 100;
-/// Parameters that announce a type: TypeInformation, TypeObject, TypeIdentifier.
-constexpr std::array<std::uint16_t, 3> kTypeParameters{0x0075, 0x0072, 0x0069};
+/// Parameters that the topics of abbe do not need, and that end Fast DDS or take its memory:
+/// TypeInformation, TypeObject, TypeIdentifier, content filter, data sharing (Fast DDS).
+constexpr std::array<std::uint16_t, 5> kBlankedParameters{0x0075, 0x0072, 0x0069, 0x0035, 0x8006};
 constexpr std::uint16_t kSentinel = 0x0001;
-/// Replaces the ids of type parameters. This id is vendor-specific and has no bit "must
+/// Replaces the ids of these parameters. This id is vendor-specific and has no bit "must
 /// understand", so a receiver skips a parameter with it.
 constexpr std::uint16_t kUnusedParameterId = 0xbfff;
 
@@ -90,8 +93,9 @@ struct Submessage {
   Bytes body;
   /// Signed by DDS Security: a change would make the receiver drop it. Its sender is trusted.
   bool is_signed = false;
-  std::span<const std::uint8_t, kPrefixBytes> source;  ///< GUID prefix of the sender
+  std::span<const std::uint8_t, kHeaderBytes> header;  ///< with the GUID prefix of the sender
   const SequenceWindow* window = nullptr;              ///< nullptr: numbers are not limited
+  FragmentJoiner* joiner = nullptr;  ///< nullptr: fragments of authentication are skipped
   [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
   [[nodiscard]] Reader reader() const { return {body, has(kLittleEndian)}; }
 };
@@ -99,7 +103,7 @@ struct Submessage {
 /// The number that a reader waits for from the writer whose entity id is at `at`; nullopt: unknown.
 std::optional<std::uint64_t> next_of(const Submessage& submessage, std::size_t at) {
   SequenceWindow::WriterGuid writer{};
-  std::ranges::copy(submessage.source, writer.begin());
+  std::ranges::copy(submessage.header.subspan<kPrefixAt, kPrefixBytes>(), writer.begin());
   std::copy_n(submessage.body.begin() + static_cast<std::ptrdiff_t>(at), 4,
               writer.begin() + kPrefixBytes);
   return submessage.window->next_of(writer);
@@ -151,41 +155,42 @@ std::optional<DataLayout> read_data(const Submessage& data, bool users) {
   return layout;
 }
 
-/// Calls change(list, id, offset of the id) for every parameter of an announcement. False if it does
-/// not conform to the standard: the message must be dropped.
-template <class Change>
-bool change_announcement(const Submessage& data, Change change) {
+void limit_lease(Reader& list, std::size_t offset) {
+  constexpr std::size_t kToValue = 4, kLeaseBytes = 8;  // seconds, fraction
+  // Unsigned: negative numbers, which stand for an endless lease, are large.
+  if (list.u16(offset + 2) < kLeaseBytes || list.u32(offset + kToValue) < kLongestLease_s) return;
+  list.put_u32(offset + kToValue, kLongestLease_s);
+  list.put_u32(offset + kToValue + 4, 0);
+}
+
+/// What becomes of an announcement.
+enum class Announcement {
+  Passes,       ///< without the parameters that must not be read, and with a limited lease
+  IsLeftOut,    ///< a value states a length that it does not have
+  EndsMessage,  ///< the list does not conform to the standard: the message must be dropped
+};
+
+Announcement check_announcement(const Submessage& data) {
+  constexpr std::size_t kToValue = 4;
   const Bytes body = data.body;
   const auto layout = read_data(data, false);
-  if (!layout) return false;
+  if (!layout) return Announcement::EndsMessage;
   const std::size_t at = layout->payload;
-  if (!data.has(kWithData | kWithKey)) return true;
-  if (at + 4 > body.size()) return false;
+  if (!data.has(kWithData | kWithKey)) return Announcement::Passes;
+  if (at + 4 > body.size()) return Announcement::EndsMessage;
   const bool little_endian = (body[at + 1] & 1) != 0;  // PL_CDR_LE is 00 03, PL_CDR_BE is 00 02
+
   Reader list(body, little_endian);
-  return walk_parameters(list, at + 4,
-                         [&](std::uint16_t id, std::size_t offset) { change(list, id, offset); })
-      .has_value();
-}
-
-/// Replaces the ids of the type parameters by an unused id. False as above.
-bool blank_types(const Submessage& data) {
-  return change_announcement(data, [](Reader& list, std::uint16_t id, std::size_t offset) {
-    if (std::ranges::find(kTypeParameters, id) != kTypeParameters.end())
+  bool states_all_lengths = true;
+  const auto end = walk_parameters(list, at + 4, [&](std::uint16_t id, std::size_t offset) {
+    if (std::ranges::find(kBlankedParameters, id) != kBlankedParameters.end())
       list.put_u16(offset, kUnusedParameterId);
+    if (id == kParticipantLease) limit_lease(list, offset);
+    const auto value = body.subspan(offset + kToValue, list.u16(offset + 2));
+    states_all_lengths = states_all_lengths && states_its_lengths(id, value, little_endian);
   });
-}
-
-/// Shortens leases. False as above.
-bool limit_lease(const Submessage& data) {
-  constexpr std::size_t kToValue = 4, kLeaseBytes = 8;  // seconds, fraction
-  return change_announcement(data, [](Reader& list, std::uint16_t id, std::size_t offset) {
-    if (id != kParticipantLease || list.u16(offset + 2) < kLeaseBytes) return;
-    // Unsigned: negative numbers, which stand for an endless lease, are large.
-    if (list.u32(offset + kToValue) < kLongestLease_s) return;
-    list.put_u32(offset + kToValue, kLongestLease_s);
-    list.put_u32(offset + kToValue + 4, 0);
-  });
+  if (!end) return Announcement::EndsMessage;
+  return states_all_lengths ? Announcement::Passes : Announcement::IsLeftOut;
 }
 
 /// Replaces a DATA submessage by a GAP of its sequence number: a reliable reader counts the sample
@@ -222,6 +227,13 @@ bool is_plain_cdr(Bytes payload) {
   return payload[0] == 0 && payload[1] <= 1;
 }
 
+/// Whether Fast DDS can read `payload` as a message of authentication.
+bool is_authentication(Bytes payload) {
+  constexpr std::size_t kEncapsulationBytes = 4;
+  return payload.size() >= kEncapsulationBytes && is_plain_cdr(payload) &&
+         authentication_states_its_lengths(payload.subspan(kEncapsulationBytes), payload[1] == 1);
+}
+
 /// False: the message must be dropped.
 bool check_data(const Submessage& data) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kShortest = 20;
@@ -230,9 +242,9 @@ bool check_data(const Submessage& data) {
   const std::uint32_t writer = entity_id(data.body, kWriterAt);
   const bool is_long = data.body.size() > kLongestAnnouncement;
   if (writer == kParticipantsWriter) {
-    if (!is_long) return limit_lease(data);
-    data.kind = kSkipped;
-    return true;
+    const auto announcement = is_long ? Announcement::IsLeftOut : check_announcement(data);
+    if (announcement == Announcement::IsLeftOut) data.kind = kSkipped;
+    return announcement != Announcement::EndsMessage;
   }
   const bool users = is_users(writer);
   const std::uint64_t ahead = users ? SequenceWindow::kAhead : SequenceWindow::kAnnouncementsAhead;
@@ -242,9 +254,10 @@ bool check_data(const Submessage& data) {
     return true;
   }
   if (announces_endpoint(writer)) {
-    if (!is_long) return blank_types(data);
-    replace_by_gap(data);  // skipped, it would keep the reader from all later announcements
-    return true;
+    const auto announcement = is_long ? Announcement::IsLeftOut : check_announcement(data);
+    // Skipped, it would keep the reader from all later announcements.
+    if (announcement == Announcement::IsLeftOut) replace_by_gap(data);
+    return announcement != Announcement::EndsMessage;
   }
 
   const auto layout = read_data(data, users && !data.is_signed);
@@ -260,15 +273,34 @@ bool check_data(const Submessage& data) {
   } else if (data.has(kWithData | kWithKey)) {
     const bool short_liveliness =
         writer == kLivelinessWriter && payload < kShortestLivelinessPayload;
-    if (payload == 0 || short_liveliness) data.kind = kSkipped;
+    if (payload == 0 || short_liveliness ||
+        (writer == kAuthenticationWriter && !is_authentication(data.body.last(payload))))
+      data.kind = kSkipped;
   }
   return true;
 }
 
+/// A fragment whose numbers are checked.
+void add_to(FragmentJoiner& joiner, const Submessage& fragment) {
+  constexpr std::size_t kIdsAt = 4, kFragmentsAt = 20, kPayloadAt = 32;
+  const Reader reader = fragment.reader();
+  Fragment part{.header = {},
+                .little_endian = fragment.has(kLittleEndian),
+                .ids = fragment.body.subspan<kIdsAt, 16>(),
+                .first = reader.u32(kFragmentsAt),
+                .count = reader.u16(kFragmentsAt + 4),
+                .size = reader.u16(kFragmentsAt + 6),
+                .sample_size = reader.u32(kFragmentsAt + 8),
+                .payload = fragment.body.subspan(kPayloadAt)};
+  std::ranges::copy(fragment.header, part.header.begin());
+  joiner.add(part);
+}
+
 /// Only the messages of DDS Security before it encrypts may be fragments: a message of abbe fits
 /// into one DATA submessage, and Fast DDS checks fragments insufficiently: without a payload behind
-/// their inline QoS it frees memory that is not its own. A fragment of an announcement cannot be
-/// checked alone; a GAP of its number lets the reader go on to later announcements.
+/// their inline QoS it frees memory that is not its own. Those of authentication are joined and then
+/// checked. A fragment of an announcement cannot be checked alone; a GAP of its number lets the
+/// reader go on to later announcements.
 void check_fragment(const Submessage& fragment) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kFragmentsAt = 20, kShortest = 32;
   const Bytes body = fragment.body;
@@ -291,7 +323,11 @@ void check_fragment(const Submessage& fragment) {
                       size = reader.u16(kFragmentsAt + 6), sample = reader.u32(kFragmentsAt + 8);
   const bool whole = first > 0 && count > 0 && size > 0 && sample > 0 &&
                      (first - 1 + count) * size < sample + size && sample <= kLongestMessage;
-  if (whole) fragment.kind = kDataFrag;
+  if (!whole) return;
+  if (writer == kKeysWriter)
+    fragment.kind = kDataFrag;
+  else if (fragment.joiner != nullptr)
+    add_to(*fragment.joiner, fragment);
 }
 
 /// Fast DDS marks each number of a gap: a long one would stop it for ever, and need all memory. A
@@ -389,15 +425,21 @@ class MessageFilter final : public rtps::ChainingTransport {
     if (size > kLongestMessage) return;
     std::copy_n(bytes, size, buffer.begin());
     const std::size_t passed =
-        filter_message(std::span(buffer).first(size), secured_, window_.get());
+        filter_message(std::span(buffer).first(size), secured_, window_.get(), &joiner_);
     if (passed > 0)
       next->OnDataReceived(buffer.data(), static_cast<std::uint32_t>(passed), local, remote);
+    while (auto joined = joiner_.take()) {
+      if (filter_message(*joined, secured_, window_.get()) == 0) continue;
+      next->OnDataReceived(joined->data(), static_cast<std::uint32_t>(joined->size()), local,
+                           remote);
+    }
   }
 
  private:
   std::shared_ptr<rtps::TransportDescriptorInterface> descriptor_;
   bool secured_;
   std::shared_ptr<SequenceWindow> window_;
+  FragmentJoiner joiner_;
 };
 
 struct FilterDescriptor final : rtps::ChainingTransportDescriptor {
@@ -416,13 +458,13 @@ struct FilterDescriptor final : rtps::ChainingTransportDescriptor {
 }  // namespace
 
 std::size_t filter_message(std::span<std::uint8_t> message, bool secured,
-                           const SequenceWindow* window) noexcept {
+                           const SequenceWindow* window, FragmentJoiner* joiner) noexcept {
   if (message.size() < kHeaderBytes) return 0;
   // A signature covers the one submessage behind its prefix, or all between the prefix and the
   // postfix of a message. What follows has none.
   bool in_signed_message = false, next_is_signed = false;
-  std::array<std::uint8_t, kPrefixBytes> source{};
-  std::copy_n(message.begin() + kPrefixAt, kPrefixBytes, source.begin());
+  std::array<std::uint8_t, kHeaderBytes> header{};
+  std::copy_n(message.begin(), kHeaderBytes, header.begin());
 
   for (std::size_t at = kHeaderBytes; at + kSubmessageHeaderBytes <= message.size();) {
     std::uint8_t &kind = message[at], &flags = message[at + 1];
@@ -439,12 +481,12 @@ std::size_t filter_message(std::span<std::uint8_t> message, bool secured,
     if (kind == kStatistics) return last ? at - kSubmessageHeaderBytes : 0;
     const Bytes body = message.subspan(at, length);
     if (kind == kInfoSource && length >= kInfoSourceBytes)
-      std::copy_n(body.begin() + kInfoSourcePrefixAt, kPrefixBytes, source.begin());
+      std::copy_n(body.begin() + kInfoSourcePrefixAt, kPrefixBytes, header.begin() + kPrefixAt);
     const bool is_signed = in_signed_message || next_is_signed;
     next_is_signed = secured && kind == kSecurePrefix;
     if (kind == kSecureMessagePrefix) in_signed_message = secured;
     if (kind == kSecureMessagePostfix) in_signed_message = false;
-    if (!check({kind, flags, body, is_signed, source, window})) return 0;
+    if (!check({kind, flags, body, is_signed, header, window, joiner})) return 0;
     at += length;
   }
   return message.size();

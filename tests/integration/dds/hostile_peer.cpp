@@ -5,6 +5,8 @@
 //                                           with and without key
 //   dds_hostile_peer DOMAIN SEED numbers    only gaps of numbers far apart, and heartbeats that skip
 //                                           a million million numbers
+//   dds_hostile_peer DOMAIN SEED tokens     only messages of authentication, whole and in fragments,
+//                                           that state four thousand million tokens
 //   dds_hostile_peer DOMAIN SEED claims     80 participants, each with the Identity of a machine of
 //                                           its own, every second
 // It announces writers and readers of all topics of abbe under changing GUIDs, and sends DATA,
@@ -126,7 +128,8 @@ class HostilePeer {
   // ---- discovery ----
   void announce_participant() {
     RtpsMessage m(prefix_);
-    m.participant(++spdp_number_, port_, chance(4) ? garbage(120) : Bytes{});
+    m.participant(++spdp_number_, port_, chance(4) ? garbage(120) : Bytes{},
+                  mode_ == "tokens" ? "DDS:Auth:PKI-DH:1.0" : "");
     to_every_port(m.bytes(), 0);
   }
   void announce_endpoints() {
@@ -343,15 +346,17 @@ class HostilePeer {
     m.end();
   }
   void discovery_parameter(RtpsMessage& m) {
-    constexpr std::array<std::uint16_t, 32> kIds{
-        0x0002, 0x0004, 0x0005, 0x0006, 0x0007, 0x000b, 0x000d, 0x000f, 0x0015, 0x0016, 0x001a,
-        0x001b, 0x001d, 0x001e, 0x0023, 0x0025, 0x0029, 0x002c, 0x002d, 0x002e, 0x002f, 0x0031,
-        0x0032, 0x0040, 0x0041, 0x0043, 0x0049, 0x0058, 0x0059, 0x0062, 0x0073, 0x0074};
+    constexpr std::array<std::uint16_t, 36> kIds{
+        0x0002, 0x0004, 0x0005, 0x0006, 0x0007, 0x000b, 0x000d, 0x000f, 0x0015,
+        0x0016, 0x001a, 0x001b, 0x001d, 0x001e, 0x0023, 0x0025, 0x0029, 0x002c,
+        0x002d, 0x002e, 0x002f, 0x0031, 0x0032, 0x0035, 0x0040, 0x0041, 0x0043,
+        0x0049, 0x0058, 0x0059, 0x0062, 0x0073, 0x0074, 0x1001, 0x1002, 0x8006};
     const auto id = chance(6) ? static_cast<std::uint16_t>(any()) : one_of(kIds);
     Bytes value = garbage(chance(6) ? 300 : 40);
-    if (chance(2) && value.size() >= 4) {  // begins with a small number: a length, a kind, a count
+    if (chance(2) && value.size() >= 4) {  // begins with a length, a kind, a count
       value[0] = static_cast<std::uint8_t>(below(24));
       value[1] = value[2] = value[3] = 0;
+      if (chance(4)) value[1] = value[2] = value[3] = any8();  // more than the value has
     }
     m.parameter(id, value);
   }
@@ -375,8 +380,32 @@ class HostilePeer {
     if (chance(200)) m.heartbeat(entity(below(daemon::kTopicCount), true), kFar, kFar, ++count_);
     return m.bytes();
   }
+  /// A whole message of authentication, or its two fragments.
+  Bytes tokens_message() {
+    constexpr std::uint32_t kAuthenticationWriter = 0x000201c3;
+    constexpr std::uint16_t kFragment = 64;
+    RtpsMessage content({});
+    content.append({0, 1, 0, 0}).append(Bytes(96, any8()));
+    content.u32(4).append({'d', 'd', 's', 0}).u32(0xffff'ffff).append(Bytes(20, any8()));
+    const Bytes sample(content.bytes().begin() + 20, content.bytes().end());
+    const std::int64_t number = ++sedp_number_;
+    RtpsMessage m(prefix_);
+    if (chance(2)) {
+      m.data(kAuthenticationWriter, number).append(sample).end();
+      return m.bytes();
+    }
+    for (std::uint32_t first = 1; (first - 1) * kFragment < sample.size(); ++first) {
+      const auto from = sample.begin() + (first - 1) * kFragment;
+      const auto end = sample.begin() + std::min<std::ptrdiff_t>(first * kFragment, sample.size());
+      m.begin(0x16, 0).u16(0).u16(28).entity(0).entity(kAuthenticationWriter).number(number);
+      m.u32(first).u16(1).u16(kFragment).u32(static_cast<std::uint32_t>(sample.size()));
+      m.append({from, end}).end();
+    }
+    return m.bytes();
+  }
   Bytes hostile_message() {
     if (mode_ == "numbers") return numbers_message();
+    if (mode_ == "tokens") return tokens_message();
     RtpsMessage m(prefix_, chance(2) ? 0x0f : 0x10);
     for (unsigned n = 1 + below(4); n > 0; --n) {
       switch (mode_ == "dispose" ? 0 : below(16)) {

@@ -1,4 +1,5 @@
 #include "abbe/dds/message_filter.hpp"
+#include "abbe/dds/fragment_joiner.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +14,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint8_t kPublications = 0x03, kSubscriptions = 0x04, kSomebodys = 0x12;
-constexpr std::uint16_t kTypeObject = 0x0072, kTypeInformation = 0x0075, kTopicName = 0x0005;
+constexpr std::uint16_t kTypeObject = 0x0072, kTypeInformation = 0x0075, kDurability = 0x001d;
 
 void append_u16(Bytes& out, std::uint16_t v, bool little_endian = true) {
   const auto low = static_cast<std::uint8_t>(v & 0xff), high = static_cast<std::uint8_t>(v >> 8);
@@ -53,15 +54,15 @@ struct MessageFilter : testing::TestWithParam<bool> {};
 
 TEST_P(MessageFilter, BlanksTypesAndNothingElse) {
   for (const auto writer : {kPublications, kSubscriptions}) {
-    Bytes message = announcement(writer, {kTopicName, kTypeObject, kTypeInformation}, GetParam());
+    Bytes message = announcement(writer, {kDurability, kTypeObject, kTypeInformation}, GetParam());
     EXPECT_EQ(filter_message(message), message.size());
-    EXPECT_EQ(message, announcement(writer, {kTopicName, 0xbfff, 0xbfff}, GetParam()));
+    EXPECT_EQ(message, announcement(writer, {kDurability, 0xbfff, 0xbfff}, GetParam()));
   }
 }
 
 TEST_P(MessageFilter, DoesNotChangeOtherWritersAndOtherParameters) {
   for (const auto& untouched : {announcement(kSomebodys, {kTypeObject}, GetParam()),
-                                announcement(kPublications, {kTopicName}, GetParam())}) {
+                                announcement(kPublications, {kDurability}, GetParam())}) {
     Bytes message = untouched;
     EXPECT_EQ(filter_message(message), message.size());
     EXPECT_EQ(message, untouched);
@@ -77,7 +78,7 @@ TEST(MessageFilterInput, ReplacesAnnouncementsInFragmentsByGaps) {
 }
 
 Bytes with_statistics(std::uint16_t length, std::size_t bytes) {
-  Bytes message = announcement(kSomebodys, {kTopicName});
+  Bytes message = announcement(kSomebodys, {kDurability});
   message.insert(message.end(), {0x80, 1, static_cast<std::uint8_t>(length & 0xff),
                                  static_cast<std::uint8_t>(length >> 8)});
   message.resize(message.size() + bytes);
@@ -85,7 +86,7 @@ Bytes with_statistics(std::uint16_t length, std::size_t bytes) {
 }
 
 TEST(MessageFilterInput, CutsStatisticsOffTheEndAndDropsMessagesThatHaveThemElsewhere) {
-  const std::size_t before = announcement(kSomebodys, {kTopicName}).size();
+  const std::size_t before = announcement(kSomebodys, {kDurability}).size();
   for (const std::uint16_t length : {std::uint16_t{8}, std::uint16_t{56}}) {
     Bytes message = with_statistics(length, length);
     EXPECT_EQ(filter_message(message), before);
@@ -97,7 +98,7 @@ TEST(MessageFilterInput, CutsStatisticsOffTheEndAndDropsMessagesThatHaveThemElse
 TEST(MessageFilterInput, DropsWrongLengths) {
   Bytes too_long = with_statistics(400, 8);
   EXPECT_EQ(filter_message(too_long), 0u);
-  Bytes odd = announcement(kSomebodys, {kTopicName});
+  Bytes odd = announcement(kSomebodys, {kDurability});
   odd[22] = static_cast<std::uint8_t>(odd[22] - 2);
   EXPECT_EQ(filter_message(odd), 0u);
 }
@@ -221,21 +222,70 @@ TEST(MessageFilterOfSamples, PassesASampleWithContentAndBlanksItsKeyHash) {
   EXPECT_TRUE(std::equal(before.begin() + kBodyAt + 22, before.end(), &message[kBodyAt + 22]));
 }
 
-TEST(MessageFilterOfSamples, SkipsFragmentsOfUsersAndPassesThoseOfDdsSecurity) {
-  const Bytes fragment{1, 0, 0, 0, 1, 0, 64, 0, 128, 0, 0, 0, 7, 7, 7, 7};
-  Bytes message = users_data(1, fragment, 0x16);
+const Bytes kAuthentication{0, 2, 1, 0xc3}, kKeys{0xff, 2, 2, 0xc3};  // writers
+
+/// Fragments `first` to `first` + `count` - 1 of a sample, each of 64 bytes.
+Bytes fragment_message(const Bytes& writer, std::uint8_t first, std::uint8_t count,
+                       std::uint8_t sample_size, const Bytes& payload) {
+  Bytes rest{first, 0, 0, 0, count, 0, 64, 0, sample_size, 0, 0, 0};
+  rest.insert(rest.end(), payload.begin(), payload.end());
+  Bytes message = data_message(0, 1, 28, rest, 0x16);
+  std::copy(writer.begin(), writer.end(), &message[kBodyAt + 8]);
+  return message;
+}
+
+TEST(MessageFilterOfSamples, SkipsFragmentsOfUsersAndPassesThoseOfKeys) {
+  Bytes message = users_data(1, {1, 0, 0, 0, 1, 0, 64, 0, 128, 0, 0, 0, 7, 7, 7, 7}, 0x16);
   EXPECT_EQ(filter_message(message), message.size());
   EXPECT_EQ(message[kKindAt], 0x7f);
 
-  message = data_message(0, 1, 28, fragment, 0x16);
-  const Bytes writer{0, 2, 1, 0xc3};
-  std::copy(writer.begin(), writer.end(), &message[kBodyAt + 8]);
-  const Bytes whole = message;
+  const Bytes whole = fragment_message(kKeys, 1, 1, 128, Bytes(64, 7));
+  message = whole;
   EXPECT_EQ(filter_message(message), message.size());
   EXPECT_EQ(message, whole);
   message[kBodyAt + 20] = 0;  // fragments are counted from 1
   EXPECT_EQ(filter_message(message), message.size());
   EXPECT_EQ(message[kKindAt], 0x7f);
+}
+
+TEST(MessageFilterOfSamples, JoinsTheFragmentsOfAuthentication) {
+  FragmentJoiner joiner;
+  const auto filter = [&](Bytes message) {
+    EXPECT_EQ(filter_message(message, true, nullptr, &joiner), message.size());
+    EXPECT_EQ(message[kKindAt], 0x7f) << "not passed as a fragment";
+  };
+  Bytes sample(140);
+  for (std::size_t i = 0; i < sample.size(); ++i) sample[i] = static_cast<std::uint8_t>(i);
+  const auto part = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
+    return Bytes(sample.begin() + from, sample.begin() + to);
+  };
+  filter(fragment_message(kAuthentication, 3, 1, 140, part(128, 140)));
+  filter(fragment_message(kAuthentication, 3, 1, 140, part(128, 140)));
+  filter(fragment_message(kAuthentication, 2, 1, 140, part(64, 70)));  // too short
+  filter(fragment_message(kAuthentication, 1, 1, 141, part(0, 64)));   // of another sample
+  EXPECT_FALSE(joiner.take());
+  filter(fragment_message(kAuthentication, 1, 2, 140, part(0, 128)));
+  Bytes expected = data_message(0, 5, 16, sample);
+  std::copy(kAuthentication.begin(), kAuthentication.end(), &expected[kBodyAt + 8]);
+  EXPECT_EQ(joiner.take(), expected);
+  EXPECT_FALSE(joiner.take());
+}
+
+TEST(MessageFilterOfSamples, JoinsAtMostAFewSamplesAtATime) {
+  FragmentJoiner joiner;
+  const auto filter = [&](std::size_t sample, std::uint8_t first) {
+    Bytes message = fragment_message(kAuthentication, first, 1, 192, Bytes(64));
+    message[kBodyAt + 16] = static_cast<std::uint8_t>(sample);  // sequence number
+    EXPECT_EQ(filter_message(message, true, nullptr, &joiner), message.size());
+  };
+  for (std::size_t i = 0; i <= FragmentJoiner::kMostSamples; ++i)
+    for (const std::uint8_t first : {std::uint8_t{1}, std::uint8_t{3}}) filter(i, first);
+  for (std::size_t i = FragmentJoiner::kMostSamples; i > 0; --i) {
+    filter(i, 2);
+    EXPECT_TRUE(joiner.take()) << i;
+  }
+  filter(0, 2);
+  EXPECT_FALSE(joiner.take()) << "the oldest was discarded";
 }
 
 Bytes gap_message(std::uint32_t start, std::uint32_t base) {
@@ -347,7 +397,7 @@ TEST(MessageFilterOfNumbers, TheHeartbeatsOfManyWritersShareWhatTheyMaySkip) {
 TEST(MessageFilterOfNumbers, SkipsAnAnnouncementFarAhead) {
   SequenceWindow window;
   for (const std::uint8_t number : {std::uint8_t{32}, std::uint8_t{33}}) {
-    Bytes message = announcement(kPublications, {kTopicName});
+    Bytes message = announcement(kPublications, {kDurability});
     message[kBodyAt + 16] = number;
     EXPECT_EQ(filter_message(message, false, &window), message.size());
     EXPECT_EQ(message[kKindAt], number == 32 ? 0x15 : 0x7f);
@@ -479,7 +529,7 @@ TEST(MessageFilterOfSamples, SkipsAShortLivelinessMessage) {
 
 /// With AddressSanitizer: every truncation, and every wrong length.
 TEST(MessageFilterInput, NeverReadsBeyondTheMessage) {
-  const Bytes list = announcement(kPublications, {kTopicName, kTypeObject, kTypeInformation});
+  const Bytes list = announcement(kPublications, {kDurability, kTypeObject, kTypeInformation});
   for (const Bytes& whole :
        {list, users_data(3, kDisposed), users_data(1, Bytes(16), 0x16), gap_message(5, 6)})
     for (std::size_t cut = 0; cut <= whole.size(); ++cut) {

@@ -75,16 +75,23 @@ class RtpsMessage {
     return begin(0x15, flags).u16(0).u16(16).entity(0).entity(writer).number(n);
   }
 
-  /// Announces the participant, whose port on this computer is `port`.
-  RtpsMessage& participant(std::int64_t n, std::uint16_t port, const Bytes& user_data = {}) {
+  /// Announces the participant, whose port on this computer is `port`. `token`: class of its tokens
+  /// of identity and permissions; empty: none.
+  RtpsMessage& participant(std::int64_t n, std::uint16_t port, const Bytes& user_data = {},
+                           const std::string& token = {}) {
     data(kParticipantWriter, n).append({0, 3, 0, 0});
     parameter(0x0015, {2, 3, 0, 0}).parameter(0x0016, {1, 15, 0, 0});
     parameter(0x0050, guid(0x000001c1));
     for (const std::uint16_t id : {std::uint16_t{0x0032}, std::uint16_t{0x0031}})
       parameter(id, locator(port));
     parameter(0x0002, {20, 0, 0, 0, 0, 0, 0, 0});  // lease
-    parameter(0x0058, {0x3f, 0x0c, 0, 0});         // builtin endpoints
+    parameter(0x0058, {0x3f, 0x0c, 0xc0, 0});  // builtin endpoints, those of authentication, too
     if (!user_data.empty()) parameter(0x002c, counted(user_data));
+    for (const std::uint16_t id : {std::uint16_t{0x1001}, std::uint16_t{0x1002}}) {
+      Bytes value = text(token);
+      value.resize((value.size() + 3) / 4 * 4 + 8);  // neither properties nor binary ones
+      if (!token.empty()) parameter(id, value);
+    }
     return end_of_parameters().end();
   }
   RtpsMessage& withdrawn_participant(std::int64_t n) {

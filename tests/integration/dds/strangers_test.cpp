@@ -147,6 +147,20 @@ TEST_F(StrangersWithSecurity, FakesAreIgnoredNoProcessEndsNothingIsLost) {
   EXPECT_LT(gap_ms, 1000.0);
 }
 
+/// Messages of authentication come before any key is checked.
+TEST_F(StrangersWithSecurity, TokensWithoutEndEndNoProcess) {
+  ASSERT_TRUE(watcher.wait_for(R"({"topic":"abbe/v1/Compensation")", {}, kHandshake));
+  ASSERT_TRUE(fast.wait_for("vmc-3: apply V", {}, kHandshake)) << fast.transcript();
+  {
+    Process hostile({ABBE_HOSTILE_PEER, domain_.text(), "1", "tokens"});
+    for (int n = 0; n < 4; ++n) ASSERT_TRUE(hostile.wait_for("sent ", Clock::now()));
+  }
+  EXPECT_TRUE(fast.wait_for("vmc-3: apply V", Clock::now())) << fast.transcript();
+  EXPECT_TRUE(watcher.wait_for(R"({"topic":"abbe/v1/Compensation")", Clock::now()))
+      << watcher.transcript();
+  EXPECT_EQ(starts(), 1) << "abbe-dds was started again";
+}
+
 /// Cyclone DDS 0.10 ended after the second kill: it got the keys of known writers again and again.
 TEST_F(StrangersWithSecurity, BothSubscribersReturnAfterEveryKillOfAbbeDds) {
   for (int kill = 0; kill < 4; ++kill) {

@@ -2,8 +2,12 @@
 /// Removes from received RTPS messages what would crash Fast DDS. Any computer of the network can
 /// send things that end a process with Debian's Fast DDS 2.9.1. With and without DDS Security:
 /// - An announced TypeObject with a sequence of structs that Fast DDS does not know (Fast-DDS issue
-///   3296). The topics of abbe need no type parameters: in endpoint announcements the filter
-///   replaces the ids of type parameters by an unused id, which every implementation skips.
+///   3296). The topics of abbe need neither type parameters nor content filters nor data sharing:
+///   in announcements the filter replaces their ids by an unused id, which every implementation
+///   skips.
+/// - Values of announcements, and messages of authentication, that state more elements or longer
+///   text than they have: Fast DDS takes memory for all, or reads on behind them. An announcement
+///   with one is left out. Fragments of messages of authentication are joined before the check.
 /// - A statistics submessage (80h, specific to Fast DDS) with a length other than the one that Fast
 ///   DDS asserts. The filter cuts such a submessage off at the end of a message, as Fast DDS does
 ///   itself. No valid sender puts one elsewhere; a message with one elsewhere is dropped.
@@ -45,13 +49,18 @@
 
 namespace abbe::dds {
 
+class FragmentJoiner;
+
 /// Changes an RTPS message [DDSI-RTPS 2.5, 8.3.4, 9.4.5.4 and 9.4.2.11] in place. Returns how many
 /// of its bytes may be passed to Fast DDS; 0: drop the message. Never reads beyond the message.
 /// `secured`: the participant uses DDS Security. Then samples and time stamps behind a signature's
 /// prefix are not changed: Fast DDS drops what a stranger puts there.
 /// `window`: what the readers of this participant wait for; nullptr: numbers are not limited by it.
+/// `joiner`: takes the fragments of messages of authentication. What it joins must be filtered, too,
+/// and passed to Fast DDS. nullptr: they are skipped.
 [[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message, bool secured = false,
-                                         const SequenceWindow* window = nullptr) noexcept;
+                                         const SequenceWindow* window = nullptr,
+                                         FragmentJoiner* joiner = nullptr) noexcept;
 
 /// Wraps `low_level`: a transport that passes received messages through the filter to Fast DDS.
 /// `window`: one for all transports of the participant; nullptr with DDS Security, which hides the

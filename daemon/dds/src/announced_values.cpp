@@ -1,0 +1,106 @@
+#include "announced_values.hpp"
+
+#include <cstddef>
+#include <optional>
+
+#include "rtps_fields.hpp"
+
+namespace abbe::dds {
+namespace {
+
+/// Reads a value in CDR from the front to the end. Each function is false if what it reads does not
+/// fit into the rest of the value.
+class Value {
+ public:
+  Value(std::span<const std::uint8_t> bytes, bool little_endian)
+      : bytes_(bytes), reader_(bytes, little_endian) {}
+
+  bool skip(std::size_t octets) {
+    if (octets > bytes_.size() - at_) return false;
+    at_ += octets;
+    return true;
+  }
+  /// Ends with the octet 0, which counts.
+  bool text() {
+    const auto length = count();
+    return length && *length > 0 && skip(*length) && bytes_[at_ - 1] == 0 && align();
+  }
+  bool octets() {
+    const auto length = count();
+    return length && skip(*length) && align();
+  }
+  bool shorts() {
+    const auto length = count();
+    return length && skip(std::size_t{2} * *length);
+  }
+  template <class Element>
+  bool sequence(Element element) {
+    const auto length = count();
+    if (!length) return false;
+    for (std::uint32_t i = 0; i < *length; ++i)  // each element takes 4 octets or more
+      if (!element()) return false;
+    return true;
+  }
+  bool texts() {
+    return sequence([&] { return text(); });
+  }
+  bool properties() {
+    return sequence([&] { return text() && text(); });
+  }
+  /// A token of DDS Security: class, properties, binary properties.
+  bool token() {
+    return text() && properties() && sequence([&] { return text() && octets(); });
+  }
+  bool tokens() {
+    return sequence([&] { return token(); });
+  }
+
+ private:
+  std::optional<std::uint32_t> count() {
+    const std::size_t from = at_;
+    return skip(4) ? std::optional{reader_.u32(from)} : std::nullopt;
+  }
+  /// To a multiple of four. The end of a value that has no padding counts as one.
+  bool align() { return skip((4 - at_ % 4) % 4) || at_ == bytes_.size(); }
+
+  std::span<const std::uint8_t> bytes_;
+  rtps_message::FieldReader<const std::uint8_t> reader_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace
+
+bool states_its_lengths(std::uint16_t id, std::span<const std::uint8_t> bytes, bool little_endian) {
+  Value value(bytes, little_endian);
+  switch (id) {
+    case 0x0005:  // name of the topic
+    case 0x0007:  // name of the type
+    case 0x0062:  // name of the entity
+      return value.text();
+    case 0x002c:  // data of user, group, topic
+    case 0x002d:
+    case 0x002e:
+      return value.octets();
+    case 0x0029:  // partitions
+      return value.texts();
+    case 0x0059:  // properties; binary properties may follow, which Fast DDS does not read
+      return value.properties();
+    case 0x0073:  // data representations
+      return value.shorts();
+    case 0x1001:  // tokens of identity and permissions
+    case 0x1002:
+      return value.token();
+    default:
+      return true;
+  }
+}
+
+bool authentication_states_its_lengths(std::span<const std::uint8_t> message, bool little_endian) {
+  // Two identities of messages, and GUIDs of destination, its endpoint, and the endpoint of the
+  // source.
+  constexpr std::size_t kFixed = 2 * 24 + 3 * 16;
+  Value value(message, little_endian);
+  return value.skip(kFixed) && value.text() && value.tokens();
+}
+
+}  // namespace abbe::dds

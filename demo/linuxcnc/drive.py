@@ -376,12 +376,17 @@ def drive_changed_machine():
     drive_calibration("changed")
     switch_on()
     phase(FAULTS["model DRIFT"])
-    wait_for_end_of_path()
 
 
 def drive_circles():
     mdi("G3 X75 Y0 I-75 J0 P60")
     time.sleep(1.0)
+
+
+def drive_circles_after_path():
+    """The drift can be found, and its message shown, at any time from the end of the path on."""
+    wait_for_end_of_path()
+    drive_circles()
 
 
 # Of each fault: what is done before it, what the machine does at it, the fault.
@@ -393,7 +398,7 @@ ACTIONS = {"tool change": (go_to_circles, drive_to_tool_change, tool_change),
            "machine off": (go_to_circles, drive_circles, machine_off),
            "model not ACTIVE": (go_to_circles, drive_circles, model_not_active),
            "not homed": (go_to_circles, joint_mode, not_homed),
-           "model DRIFT": (drive_changed_machine, drive_circles, model_drifts),
+           "model DRIFT": (drive_changed_machine, drive_circles_after_path, model_drifts),
            "feeder killed": (go_to_circles, drive_circles, feeder_killed)}
 
 
@@ -425,8 +430,8 @@ def check_messages(name):
 def fault(name):
     prepare, drive, act = ACTIONS[name]
     prepare()
-    drive()
     shown()
+    drive()
     phase(FAULTS[name])
     act()
     time.sleep(0.5)

@@ -369,24 +369,20 @@ def go_to_circles():
 
 
 def drive_changed_machine():
-    """The path of a calibration, which ends at the beginning of the circles. The correction is on before
-    abbed has seen the end, which takes a standstill of 1 s, so before the calibration shows that the
-    machine changed."""
+    """The path of a calibration, which ends at the beginning of the circles. The correction is switched
+    on when abbed has seen the end of the path: before, it would move the machine away from the last
+    vertex. The identification, which shows that the machine changed, takes some seconds more."""
     write_request("change-machine")
     drive_calibration("changed")
-    switch_on()
+    wait_for_end_of_path()
+    enable(True)
+    wait_until("the correction is active", active)
     phase(FAULTS["model DRIFT"])
 
 
 def drive_circles():
     mdi("G3 X75 Y0 I-75 J0 P60")
     time.sleep(1.0)
-
-
-def drive_circles_after_path():
-    """The drift can be found, and its message shown, at any time from the end of the path on."""
-    wait_for_end_of_path()
-    drive_circles()
 
 
 # Of each fault: what is done before it, what the machine does at it, the fault.
@@ -398,7 +394,7 @@ ACTIONS = {"tool change": (go_to_circles, drive_to_tool_change, tool_change),
            "machine off": (go_to_circles, drive_circles, machine_off),
            "model not ACTIVE": (go_to_circles, drive_circles, model_not_active),
            "not homed": (go_to_circles, joint_mode, not_homed),
-           "model DRIFT": (drive_changed_machine, drive_circles_after_path, model_drifts),
+           "model DRIFT": (drive_changed_machine, drive_circles, model_drifts),
            "feeder killed": (go_to_circles, drive_circles, feeder_killed)}
 
 
@@ -429,8 +425,8 @@ def check_messages(name):
 
 def fault(name):
     prepare, drive, act = ACTIONS[name]
-    prepare()
     shown()
+    prepare()
     drive()
     phase(FAULTS[name])
     act()

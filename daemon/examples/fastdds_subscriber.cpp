@@ -356,9 +356,12 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
     transports.user_transports.push_back(
         std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
   }
+  using abbe::dds::
+      Protection;  // the governance that `abbe dds keys` makes has every message signed
+  const auto protection = secured ? Protection::Messages : Protection::None;
   const auto window = secured ? nullptr : std::make_shared<abbe::dds::SequenceWindow>();
   for (auto& transport : transports.user_transports)
-    transport = abbe::dds::with_message_filter(transport, secured, window);
+    transport = abbe::dds::with_message_filter(transport, protection, window);
 }
 
 /// A generated type whose deserialize() does not throw: any participant of the domain may send bytes

@@ -51,6 +51,7 @@ class Value {
   bool token() {
     return text() && properties() && sequence([&] { return text() && octets(); });
   }
+  [[nodiscard]] bool at_end() const { return at_ == bytes_.size(); }
   bool tokens() {
     return sequence([&] { return token(); });
   }
@@ -68,34 +69,81 @@ class Value {
   std::size_t at_ = 0;
 };
 
+/// nullopt: the length varies, or Fast DDS does not read the parameter.
+std::optional<std::size_t> fixed_length(std::uint16_t id) {
+  constexpr std::size_t kKind = 4, kTime = 8, kLocator = 24, kGuid = 16;
+  switch (id) {
+    case 0x0015:  // version of the protocol
+    case 0x0016:  // vendor
+    case 0x0043:  // expects inline QoS
+    case 0x0058:  // builtin endpoints
+    case 0x0006:  // strength of the ownership
+    case 0x001d:  // durability
+    case 0x001f:  // ownership
+    case 0x0025:  // destination order
+    case 0x8005:  // positive ACKs
+      return kKind;
+    case 0x0002:  // lease
+    case 0x0004:  // time-based filter
+    case 0x0021:  // presentation
+    case 0x0023:  // deadline
+    case 0x0027:  // latency budget
+    case 0x002b:  // lifespan
+    case 0x1004:  // security of endpoint and participant
+    case 0x1005:
+      return kTime;
+    case 0x001a:  // reliability
+    case 0x001b:  // liveliness
+      return kKind + kTime;
+    case 0x001e:  // durability service
+      return kTime + 5 * kKind;
+    case 0x002f:  // locators
+    case 0x0030:
+    case 0x0031:
+    case 0x0032:
+    case 0x0033:
+    case 0x0048:
+      return kLocator;
+    case 0x0050:  // GUID of participant and endpoint, key hash, GUID of the stored history
+    case 0x005a:
+    case 0x0070:
+    case 0x8002:
+      return kGuid;
+    default:
+      return std::nullopt;
+  }
+}
+
 }  // namespace
 
-bool states_its_lengths(std::uint16_t id, std::span<const std::uint8_t> bytes, bool little_endian) {
+bool has_valid_lengths(std::uint16_t id, std::span<const std::uint8_t> bytes, bool little_endian) {
+  constexpr std::size_t kLongestText = 256;  // that Fast DDS accepts
+  if (const auto length = fixed_length(id)) return bytes.size() == *length;
   Value value(bytes, little_endian);
   switch (id) {
     case 0x0005:  // name of the topic
     case 0x0007:  // name of the type
     case 0x0062:  // name of the entity
-      return value.text();
+      return bytes.size() <= kLongestText && value.text();
     case 0x002c:  // data of user, group, topic
     case 0x002d:
     case 0x002e:
-      return value.octets();
+      return value.octets() && value.at_end();
     case 0x0029:  // partitions
-      return value.texts();
+      return value.texts() && value.at_end();
     case 0x0059:  // properties; binary properties may follow, which Fast DDS does not read
       return value.properties();
     case 0x0073:  // data representations
       return value.shorts();
     case 0x1001:  // tokens of identity and permissions
     case 0x1002:
-      return value.token();
+      return value.token() && value.at_end();
     default:
       return true;
   }
 }
 
-bool authentication_states_its_lengths(std::span<const std::uint8_t> message, bool little_endian) {
+bool authentication_has_valid_lengths(std::span<const std::uint8_t> message, bool little_endian) {
   // Two identities of messages, and GUIDs of destination, its endpoint, and the endpoint of the
   // source.
   constexpr std::size_t kFixed = 2 * 24 + 3 * 16;

@@ -9,14 +9,14 @@
 namespace abbe::dds {
 
 /// Whether the value of the parameter `id` of an announcement [DDSI-RTPS 2.5, 9.6.3; DDS Security
-/// 1.1, 7.4.1] has the elements and the text that it states. True for the parameters of fixed
-/// length, which Fast DDS checks, and for those that it does not read.
-[[nodiscard]] bool states_its_lengths(std::uint16_t id, std::span<const std::uint8_t> value,
-                                      bool little_endian);
+/// 1.1, 7.4.1] has the length of its type, and the elements and the text that it states. True for
+/// parameters that Fast DDS does not read. An announcement that Fast DDS refuses stays in its memory.
+[[nodiscard]] bool has_valid_lengths(std::uint16_t id, std::span<const std::uint8_t> value,
+                                     bool little_endian);
 
 /// The same of a message of authentication, which comes before any signature: a
 /// ParticipantGenericMessage behind its encapsulation [DDS Security 1.1, 7.4.3.5].
-[[nodiscard]] bool authentication_states_its_lengths(std::span<const std::uint8_t> message,
-                                                     bool little_endian);
+[[nodiscard]] bool authentication_has_valid_lengths(std::span<const std::uint8_t> message,
+                                                    bool little_endian);
 
 }  // namespace abbe::dds

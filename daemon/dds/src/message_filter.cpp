@@ -1,25 +1,22 @@
 #include "abbe/dds/message_filter.hpp"
 
-#include <fastdds/rtps/transport/ChainingTransport.h>
-
 #include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "abbe/dds/fragment_joiner.hpp"
+#include "abbe/dds/fragment_reassembly.hpp"
 #include "announced_values.hpp"
+#include "protected_structure.hpp"
 #include "rtps_fields.hpp"
 
 namespace abbe::dds {
 namespace {
 
-namespace rtps = eprosima::fastdds::rtps;
 using namespace rtps_message;
 using Bytes = std::span<std::uint8_t>;
 
-constexpr std::size_t kLongestMessage = 65536;  // a UDP datagram
 /// Replaces the kind of a submessage that must not be read. The kind is not assigned, so a receiver
 /// skips the submessage [DDSI-RTPS 2.5, 9.4.5.1.1].
 constexpr std::uint8_t kSkipped = 0x7f;
@@ -50,6 +47,7 @@ constexpr std::uint32_t kLongestLease_s = 100;
 /// Parameters that the topics of abbe do not need, and that end Fast DDS or take its memory:
 /// TypeInformation, TypeObject, TypeIdentifier, content filter, data sharing (Fast DDS).
 constexpr std::array<std::uint16_t, 5> kBlankedParameters{0x0075, 0x0072, 0x0069, 0x0035, 0x8006};
+constexpr std::uint16_t kEndpointGuid = 0x005a;
 constexpr std::uint16_t kSentinel = 0x0001;
 /// Replaces the ids of these parameters. This id is vendor-specific and has no bit "must
 /// understand", so a receiver skips a parameter with it.
@@ -95,7 +93,7 @@ struct Submessage {
   bool is_signed = false;
   std::span<const std::uint8_t, kHeaderBytes> header;  ///< with the GUID prefix of the sender
   const SequenceWindow* window = nullptr;              ///< nullptr: numbers are not limited
-  FragmentJoiner* joiner = nullptr;  ///< nullptr: fragments of authentication are skipped
+  Reassembly* reassembly = nullptr;  ///< nullptr: fragments of authentication are skipped
   [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
   [[nodiscard]] Reader reader() const { return {body, has(kLittleEndian)}; }
 };
@@ -166,31 +164,34 @@ void limit_lease(Reader& list, std::size_t offset) {
 /// What becomes of an announcement.
 enum class Announcement {
   Passes,       ///< without the parameters that must not be read, and with a limited lease
-  IsLeftOut,    ///< a value states a length that it does not have
-  EndsMessage,  ///< the list does not conform to the standard: the message must be dropped
+  Malformed,    ///< a value states a length that it does not have
+  DropMessage,  ///< the list does not conform to the standard: the message must be dropped
 };
 
 Announcement check_announcement(const Submessage& data) {
   constexpr std::size_t kToValue = 4;
   const Bytes body = data.body;
   const auto layout = read_data(data, false);
-  if (!layout) return Announcement::EndsMessage;
+  if (!layout) return Announcement::DropMessage;
   const std::size_t at = layout->payload;
   if (!data.has(kWithData | kWithKey)) return Announcement::Passes;
-  if (at + 4 > body.size()) return Announcement::EndsMessage;
+  if (at + 4 > body.size()) return Announcement::DropMessage;
   const bool little_endian = (body[at + 1] & 1) != 0;  // PL_CDR_LE is 00 03, PL_CDR_BE is 00 02
 
   Reader list(body, little_endian);
-  bool states_all_lengths = true;
+  bool valid = body[at] == 0 && (body[at + 1] == 2 || body[at + 1] == 3);
   const auto end = walk_parameters(list, at + 4, [&](std::uint16_t id, std::size_t offset) {
     if (std::ranges::find(kBlankedParameters, id) != kBlankedParameters.end())
       list.put_u16(offset, kUnusedParameterId);
     if (id == kParticipantLease) limit_lease(list, offset);
     const auto value = body.subspan(offset + kToValue, list.u16(offset + 2));
-    states_all_lengths = states_all_lengths && states_its_lengths(id, value, little_endian);
+    valid = valid && has_valid_lengths(id, value, little_endian);
+    if (id == kEndpointGuid)
+      valid = valid && std::ranges::equal(value.first(kPrefixBytes),
+                                          data.header.subspan(kPrefixAt, kPrefixBytes));
   });
-  if (!end) return Announcement::EndsMessage;
-  return states_all_lengths ? Announcement::Passes : Announcement::IsLeftOut;
+  if (!end) return Announcement::DropMessage;
+  return valid ? Announcement::Passes : Announcement::Malformed;
 }
 
 /// Replaces a DATA submessage by a GAP of its sequence number: a reliable reader counts the sample
@@ -231,7 +232,7 @@ bool is_plain_cdr(Bytes payload) {
 bool is_authentication(Bytes payload) {
   constexpr std::size_t kEncapsulationBytes = 4;
   return payload.size() >= kEncapsulationBytes && is_plain_cdr(payload) &&
-         authentication_states_its_lengths(payload.subspan(kEncapsulationBytes), payload[1] == 1);
+         authentication_has_valid_lengths(payload.subspan(kEncapsulationBytes), payload[1] == 1);
 }
 
 /// False: the message must be dropped.
@@ -242,9 +243,9 @@ bool check_data(const Submessage& data) {
   const std::uint32_t writer = entity_id(data.body, kWriterAt);
   const bool is_long = data.body.size() > kLongestAnnouncement;
   if (writer == kParticipantsWriter) {
-    const auto announcement = is_long ? Announcement::IsLeftOut : check_announcement(data);
-    if (announcement == Announcement::IsLeftOut) data.kind = kSkipped;
-    return announcement != Announcement::EndsMessage;
+    const auto announcement = is_long ? Announcement::Malformed : check_announcement(data);
+    if (announcement == Announcement::Malformed) data.kind = kSkipped;
+    return announcement != Announcement::DropMessage;
   }
   const bool users = is_users(writer);
   const std::uint64_t ahead = users ? SequenceWindow::kAhead : SequenceWindow::kAnnouncementsAhead;
@@ -254,10 +255,10 @@ bool check_data(const Submessage& data) {
     return true;
   }
   if (announces_endpoint(writer)) {
-    const auto announcement = is_long ? Announcement::IsLeftOut : check_announcement(data);
+    const auto announcement = is_long ? Announcement::Malformed : check_announcement(data);
     // Skipped, it would keep the reader from all later announcements.
-    if (announcement == Announcement::IsLeftOut) replace_by_gap(data);
-    return announcement != Announcement::EndsMessage;
+    if (announcement == Announcement::Malformed) replace_by_gap(data);
+    return announcement != Announcement::DropMessage;
   }
 
   const auto layout = read_data(data, users && !data.is_signed);
@@ -281,7 +282,7 @@ bool check_data(const Submessage& data) {
 }
 
 /// A fragment whose numbers are checked.
-void add_to(FragmentJoiner& joiner, const Submessage& fragment) {
+void add_to(Reassembly& reassembly, const Submessage& fragment) {
   constexpr std::size_t kIdsAt = 4, kFragmentsAt = 20, kPayloadAt = 32;
   const Reader reader = fragment.reader();
   Fragment part{.header = {},
@@ -293,13 +294,14 @@ void add_to(FragmentJoiner& joiner, const Submessage& fragment) {
                 .sample_size = reader.u32(kFragmentsAt + 8),
                 .payload = fragment.body.subspan(kPayloadAt)};
   std::ranges::copy(fragment.header, part.header.begin());
-  joiner.add(part);
+  if (auto message = reassembly.fragments.add(part))
+    reassembly.complete.push_back(*std::move(message));
 }
 
 /// Only the messages of DDS Security before it encrypts may be fragments: a message of abbe fits
 /// into one DATA submessage, and Fast DDS checks fragments insufficiently: without a payload behind
-/// their inline QoS it frees memory that is not its own. Those of authentication are joined and then
-/// checked. A fragment of an announcement cannot be checked alone; a GAP of its number lets the
+/// their inline QoS it frees memory that is not its own. Those of authentication are reassembled
+/// and then checked. A fragment of an announcement cannot be checked alone; a GAP of its number lets the
 /// reader go on to later announcements.
 void check_fragment(const Submessage& fragment) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kFragmentsAt = 20, kShortest = 32;
@@ -324,10 +326,11 @@ void check_fragment(const Submessage& fragment) {
   const bool whole = first > 0 && count > 0 && size > 0 && sample > 0 &&
                      (first - 1 + count) * size < sample + size && sample <= kLongestMessage;
   if (!whole) return;
-  if (writer == kKeysWriter)
-    fragment.kind = kDataFrag;
-  else if (fragment.joiner != nullptr)
-    add_to(*fragment.joiner, fragment);
+  if (writer == kKeysWriter) {
+    if (fragment.is_signed) fragment.kind = kDataFrag;
+  } else if (fragment.reassembly != nullptr) {
+    add_to(*fragment.reassembly, fragment);
+  }
 }
 
 /// Fast DDS marks each number of a gap: a long one would stop it for ever, and need all memory. A
@@ -360,6 +363,51 @@ void limit_heartbeat(const Submessage& heartbeat) {
   if (first <= next) return;
   const std::uint64_t allowed = heartbeat.window->take_skip(first - next);
   if (allowed < first - next) reader.put_sequence_number(kFirstAt, next + allowed);
+}
+
+/// Fast DDS delivers to the reader that a submessage names, from a writer that it does not know, too:
+/// the content would be checked as that of another writer.
+bool is_for_its_reader(const Submessage& submessage) {
+  const bool is_data = submessage.kind == kData || submessage.kind == kDataFrag;
+  const bool is_of_writer = is_data || submessage.kind == kHeartbeat || submessage.kind == kGap ||
+                            submessage.kind == kHeartbeatFrag;
+  if (!is_of_writer) return true;
+  const std::size_t at = is_data ? 4 : 0;
+  if (submessage.body.size() < at + 8) return false;
+  const std::uint32_t reader = entity_id(submessage.body, at),
+                      writer = entity_id(submessage.body, at + 4);
+  if (writer == 0) return false;
+  if (reader == 0) return true;
+  if (is_users(writer)) return is_users(reader);
+  // Of the same number; kinds c2 and c7, c3 and c4 belong together.
+  const std::uint32_t kind = (writer & 0xff) == 0xc2 ? 0xc7 : 0xc4;
+  return reader == ((writer & 0xffff'ff00) | kind);
+}
+
+/// With keys Fast DDS 2.9 accepts samples without signature as those of the participant whose GUID
+/// they state. Nobody else signs: announcements of participants and authentication come before there
+/// are keys for it.
+bool may_be_unsigned(const Submessage& submessage) {
+  switch (submessage.kind) {
+    case kData:
+    case kDataFrag: {
+      const std::uint32_t writer = entity_id(submessage.body, 8);
+      return writer == kAuthenticationWriter ||
+             (writer == kParticipantsWriter && submessage.kind == kData);
+    }
+    case kPad:
+    case kInfoTimestamp:
+    case kInfoSource:
+    case kInfoReplyIp4:
+    case kInfoDestination:
+    case kInfoReply:
+    case kSecureBody:
+    case kSecurePrefix:
+    case kSecurePostfix:
+      return true;
+    default:
+      return false;
+  }
 }
 
 /// Changes one submessage so that Fast DDS can read it. False: the message must be dropped.
@@ -395,107 +443,52 @@ bool check(const Submessage& submessage) {
   }
 }
 
-/// Passes the bytes of the low-level transport through the filter to Fast DDS.
-class MessageFilter final : public rtps::ChainingTransport {
- public:
-  MessageFilter(const rtps::ChainingTransportDescriptor& descriptor, bool secured,
-                std::shared_ptr<SequenceWindow> window)
-      : ChainingTransport(descriptor),
-        descriptor_(descriptor.low_level_descriptor),
-        secured_(secured),
-        window_(std::move(window)) {}
-
-  rtps::TransportDescriptorInterface* get_configuration() override { return descriptor_.get(); }
-
-  bool send(eprosima::fastrtps::rtps::SenderResource* sender,
-            const eprosima::fastrtps::rtps::octet* bytes, uint32_t size,
-            eprosima::fastrtps::rtps::LocatorsIterator* begin,
-            eprosima::fastrtps::rtps::LocatorsIterator* end,
-            const std::chrono::steady_clock::time_point& timeout) override {
-    if (window_ != nullptr) window_->sent({bytes, size});
-    return sender->send(bytes, size, begin, end, timeout);
-  }
-
-  void receive(rtps::TransportReceiverInterface* next, const eprosima::fastrtps::rtps::octet* bytes,
-               uint32_t size, const eprosima::fastrtps::rtps::Locator_t& local,
-               const eprosima::fastrtps::rtps::Locator_t& remote) override {
-    // Twice the longest message: where Fast DDS reads up to a length that a message only states, it
-    // stays within this buffer.
-    thread_local std::vector<std::uint8_t> buffer(2 * kLongestMessage);
-    if (size > kLongestMessage) return;
-    std::copy_n(bytes, size, buffer.begin());
-    const std::size_t passed =
-        filter_message(std::span(buffer).first(size), secured_, window_.get(), &joiner_);
-    if (passed > 0)
-      next->OnDataReceived(buffer.data(), static_cast<std::uint32_t>(passed), local, remote);
-    while (auto joined = joiner_.take()) {
-      if (filter_message(*joined, secured_, window_.get()) == 0) continue;
-      next->OnDataReceived(joined->data(), static_cast<std::uint32_t>(joined->size()), local,
-                           remote);
-    }
-  }
-
- private:
-  std::shared_ptr<rtps::TransportDescriptorInterface> descriptor_;
-  bool secured_;
-  std::shared_ptr<SequenceWindow> window_;
-  FragmentJoiner joiner_;
-};
-
-struct FilterDescriptor final : rtps::ChainingTransportDescriptor {
-  FilterDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool is_secured,
-                   std::shared_ptr<SequenceWindow> numbers)
-      : ChainingTransportDescriptor(std::move(low_level)),
-        secured(is_secured),
-        window(std::move(numbers)) {}
-  [[nodiscard]] rtps::TransportInterface* create_transport() const override {
-    return new MessageFilter(*this, secured, window);
-  }
-  bool secured;
-  std::shared_ptr<SequenceWindow> window;
-};
-
 }  // namespace
 
-std::size_t filter_message(std::span<std::uint8_t> message, bool secured,
-                           const SequenceWindow* window, FragmentJoiner* joiner) noexcept {
+std::size_t filter_message(std::span<std::uint8_t> message, Protection protection,
+                           const SequenceWindow* window, Reassembly* reassembly) noexcept {
   if (message.size() < kHeaderBytes) return 0;
-  // A signature covers the one submessage behind its prefix, or all between the prefix and the
-  // postfix of a message. What follows has none.
-  bool in_signed_message = false, next_is_signed = false;
+  ProtectedStructure structure;
   std::array<std::uint8_t, kHeaderBytes> header{};
   std::copy_n(message.begin(), kHeaderBytes, header.begin());
 
   for (std::size_t at = kHeaderBytes; at + kSubmessageHeaderBytes <= message.size();) {
+    const bool first = at == kHeaderBytes;
     std::uint8_t &kind = message[at], &flags = message[at + 1];
     std::size_t length = Reader(message, (flags & kLittleEndian) != 0).u16(at + 2);
     at += kSubmessageHeaderBytes;
 
     // A length of zero means "up to the end of the message", except for the two kinds of
     // submessages that may be empty.
-    if (length == 0 && kind != kPad && kind != kInfoTimestamp) length = message.size() - at;
+    const bool open = length == 0 && kind != kPad && kind != kInfoTimestamp;
+    if (open) length = message.size() - at;
     if (at + length > message.size()) return 0;
     const bool last = at + length == message.size();
     if (!last && length % 4 != 0) return 0;
 
-    if (kind == kStatistics) return last ? at - kSubmessageHeaderBytes : 0;
+    if (kind == kStatistics)
+      return last && structure.is_complete() ? at - kSubmessageHeaderBytes : 0;
     const Bytes body = message.subspan(at, length);
+    at += length;
     if (kind == kInfoSource && length >= kInfoSourceBytes)
       std::copy_n(body.begin() + kInfoSourcePrefixAt, kPrefixBytes, header.begin() + kPrefixAt);
-    const bool is_signed = in_signed_message || next_is_signed;
-    next_is_signed = secured && kind == kSecurePrefix;
-    if (kind == kSecureMessagePrefix) in_signed_message = secured;
-    if (kind == kSecureMessagePostfix) in_signed_message = false;
-    if (!check({kind, flags, body, is_signed, header, window, joiner})) return 0;
-    at += length;
-  }
-  return message.size();
-}
 
-std::shared_ptr<rtps::TransportDescriptorInterface> with_message_filter(
-    std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool secured,
-    std::shared_ptr<SequenceWindow> window) {
-  return std::make_shared<FilterDescriptor>(std::move(low_level), secured, std::move(window));
+    bool is_signed = false;
+    if (protection != Protection::None) {
+      const auto found = structure.next(kind, body, first, open);
+      if (!found) return 0;
+      is_signed = *found;
+    }
+    const Submessage submessage{kind, flags, body, is_signed, header, window, reassembly};
+    const bool passes =
+        is_signed || (is_for_its_reader(submessage) &&
+                      (protection != Protection::Messages || may_be_unsigned(submessage)));
+    if (!passes)
+      kind = kSkipped;
+    else if (!check(submessage))
+      return 0;
+  }
+  return structure.is_complete() ? message.size() : 0;
 }
 
 }  // namespace abbe::dds

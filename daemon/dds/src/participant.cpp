@@ -135,10 +135,12 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   limit_memory(*qos);
 
   auto allowed = white_list(*qos);
-  const bool secured = has_security(*qos);
-  const auto window = secured ? nullptr : std::make_shared<SequenceWindow>();
+  const auto protection = !has_security(*qos)        ? Protection::None
+                          : options.security.empty() ? Protection::Profile
+                                                     : Protection::Messages;
+  const auto window = protection == Protection::None ? std::make_shared<SequenceWindow>() : nullptr;
   for (auto& transport : qos->transport().user_transports)
-    transport = with_message_filter(transport, secured, window);
+    transport = with_message_filter(transport, protection, window);
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
 

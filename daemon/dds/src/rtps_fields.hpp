@@ -7,13 +7,16 @@
 
 namespace abbe::dds::rtps_message {
 
+inline constexpr std::size_t kLongestMessage = 65536;  ///< a UDP datagram
 inline constexpr std::size_t kHeaderBytes = 20, kSubmessageHeaderBytes = 4, kPrefixAt = 8,
                              kPrefixBytes = 12;
 inline constexpr std::uint8_t kPad = 0x01, kAckNack = 0x06, kHeartbeat = 0x07, kGap = 0x08,
-                              kInfoTimestamp = 0x09, kInfoSource = 0x0c, kInfoDestination = 0x0e,
-                              kNackFrag = 0x12, kHeartbeatFrag = 0x13, kData = 0x15,
-                              kDataFrag = 0x16, kSecurePrefix = 0x31, kSecureMessagePrefix = 0x33,
-                              kSecureMessagePostfix = 0x34, kStatistics = 0x80;
+                              kInfoTimestamp = 0x09, kInfoSource = 0x0c, kInfoReplyIp4 = 0x0d,
+                              kInfoDestination = 0x0e, kInfoReply = 0x0f, kNackFrag = 0x12,
+                              kHeartbeatFrag = 0x13, kData = 0x15, kDataFrag = 0x16,
+                              kSecureBody = 0x30, kSecurePrefix = 0x31, kSecurePostfix = 0x32,
+                              kSecureMessagePrefix = 0x33, kSecureMessagePostfix = 0x34,
+                              kStatistics = 0x80;
 inline constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kWithData = 0x04,
                               kWithKey = 0x08, kNoTimestamp = 0x02;
 

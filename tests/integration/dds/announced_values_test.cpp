@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abbe/dds/message_filter.hpp"
@@ -77,7 +78,7 @@ Bytes authentication(const Bytes& content) {
 
 /// The kind of the submessage behind the filter.
 std::uint8_t kind_after(Bytes message) {
-  EXPECT_EQ(dds::filter_message(message, true), message.size());
+  EXPECT_EQ(dds::filter_message(message, dds::Protection::Profile), message.size());
   return message[kKindAt];
 }
 
@@ -125,6 +126,29 @@ TEST(AnnouncedValues, OfTextWithoutAnEndAreLeftOut) {
   }
   const Bytes partition{1, 0, 0, 0, 4, 0, 0, 0, 'a', 'b', 'c', 'd'};
   EXPECT_EQ(kind_after(announcement(kSubscriptionsWriter, 0x0029, partition)), kGap);
+}
+
+/// Announcements that Fast DDS refuses stay in its memory.
+TEST(AnnouncedValues, OfAnotherLengthThanThatOfTheirTypeAreLeftOut) {
+  for (const auto& [id, right] : {std::pair<std::uint16_t, std::size_t>{0x001d, 4},
+                                  {0x001a, 12},
+                                  {0x001b, 12},
+                                  {0x0032, 24},
+                                  {0x0070, 16},
+                                  {0x0023, 8}})
+    for (const std::size_t length : {std::size_t{0}, right - 4, right, right + 4})
+      EXPECT_EQ(kind_after(announcement(kPublicationsWriter, id, Bytes(length))),
+                length == right ? kData : kGap)
+          << id << ", " << length;
+  const Bytes long_name = Value{}.text(std::string(260, 'a')).bytes;
+  EXPECT_EQ(kind_after(announcement(kPublicationsWriter, 0x0005, long_name)), kGap);
+}
+
+TEST(AnnouncedValues, OfAnEndpointOfAnotherParticipantAreLeftOut) {
+  Bytes guid{1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2};
+  EXPECT_EQ(kind_after(announcement(kPublicationsWriter, 0x005a, guid)), kData);
+  guid[0] = 2;
+  EXPECT_EQ(kind_after(announcement(kPublicationsWriter, 0x005a, guid)), kGap);
 }
 
 TEST(AnnouncedValues, OfContentFiltersAndDataSharingAreBlanked) {

@@ -7,13 +7,15 @@
 //                                           a million million numbers
 //   dds_hostile_peer DOMAIN SEED tokens     only messages of authentication, whole and in fragments,
 //                                           that state four thousand million tokens
+//   dds_hostile_peer DOMAIN SEED forged     only vectors of 999 um, unsigned, with the GUIDs of the
+//                                           writers that the other participants may have
 //   dds_hostile_peer DOMAIN SEED claims     80 participants, each with the Identity of a machine of
 //                                           its own, every second
 // It announces writers and readers of all topics of abbe under changing GUIDs, and sends DATA,
 // DATA_FRAG, HEARTBEAT, GAP, ACKNACK and all other submessages of the standard with random content
-// to the participants 0 to 15 of the domain on this computer. It uses no GUID of another
-// participant. It runs until it is killed, prints "started" when it begins to send, and "sent N"
-// every 200 messages.
+// to the participants 0 to 15 of the domain on this computer. Except with `forged`, it uses no GUID of
+// another participant. It runs until it is killed, prints "started" when it begins to send, and
+// "sent N" every 200 messages.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -403,7 +405,16 @@ class HostilePeer {
     }
     return m.bytes();
   }
+  /// A vector as of the writer `number` of another participant.
+  Bytes forged_message(std::uint32_t number) {
+    RtpsMessage m(known_prefix());
+    auto vector = test::compensation(static_cast<std::uint64_t>(1'000'000 + sedp_number_));
+    vector.vector_m({999e-6, 999e-6, 999e-6});
+    m.data(0x100 * number | 0x02, 1'000'000 + ++sedp_number_).append(bytes_of(vector)).end();
+    return m.bytes();
+  }
   Bytes hostile_message() {
+    if (mode_ == "forged") return forged_message(1 + below(12));
     if (mode_ == "numbers") return numbers_message();
     if (mode_ == "tokens") return tokens_message();
     RtpsMessage m(prefix_, chance(2) ? 0x0f : 0x10);

@@ -1,10 +1,11 @@
 #include "abbe/dds/message_filter.hpp"
-#include "abbe/dds/fragment_joiner.hpp"
+#include "abbe/dds/fragment_reassembly.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -234,58 +235,59 @@ Bytes fragment_message(const Bytes& writer, std::uint8_t first, std::uint8_t cou
   return message;
 }
 
-TEST(MessageFilterOfSamples, SkipsFragmentsOfUsersAndPassesThoseOfKeys) {
-  Bytes message = users_data(1, {1, 0, 0, 0, 1, 0, 64, 0, 128, 0, 0, 0, 7, 7, 7, 7}, 0x16);
-  EXPECT_EQ(filter_message(message), message.size());
-  EXPECT_EQ(message[kKindAt], 0x7f);
-
-  const Bytes whole = fragment_message(kKeys, 1, 1, 128, Bytes(64, 7));
-  message = whole;
-  EXPECT_EQ(filter_message(message), message.size());
-  EXPECT_EQ(message, whole);
-  message[kBodyAt + 20] = 0;  // fragments are counted from 1
-  EXPECT_EQ(filter_message(message), message.size());
-  EXPECT_EQ(message[kKindAt], 0x7f);
+TEST(MessageFilterOfSamples, SkipsFragmentsOfUsersAndOfKeysWithoutSignature) {
+  for (Bytes message : {users_data(1, {1, 0, 0, 0, 1, 0, 64, 0, 128, 0, 0, 0, 7, 7, 7, 7}, 0x16),
+                        fragment_message(kKeys, 1, 1, 128, Bytes(64, 7))}) {
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kKindAt], 0x7f);
+  }
 }
 
-TEST(MessageFilterOfSamples, JoinsTheFragmentsOfAuthentication) {
-  FragmentJoiner joiner;
-  const auto filter = [&](Bytes message) {
-    EXPECT_EQ(filter_message(message, true, nullptr, &joiner), message.size());
-    EXPECT_EQ(message[kKindAt], 0x7f) << "not passed as a fragment";
-  };
+struct FragmentsOfAuthentication : testing::Test {
+  /// The message that `fragment` completes.
+  std::optional<Bytes> completed_by(Bytes fragment) {
+    Reassembly reassembly{fragments, {}};
+    EXPECT_EQ(filter_message(fragment, Protection::Messages, nullptr, &reassembly),
+              fragment.size());
+    EXPECT_EQ(fragment[kKindAt], 0x7f) << "not passed as a fragment";
+    EXPECT_LE(reassembly.complete.size(), 1u);
+    if (reassembly.complete.empty()) return std::nullopt;
+    return reassembly.complete.front();
+  }
+  FragmentReassembly fragments;
+};
+
+TEST_F(FragmentsOfAuthentication, AreReassembled) {
   Bytes sample(140);
   for (std::size_t i = 0; i < sample.size(); ++i) sample[i] = static_cast<std::uint8_t>(i);
   const auto part = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
     return Bytes(sample.begin() + from, sample.begin() + to);
   };
-  filter(fragment_message(kAuthentication, 3, 1, 140, part(128, 140)));
-  filter(fragment_message(kAuthentication, 3, 1, 140, part(128, 140)));
-  filter(fragment_message(kAuthentication, 2, 1, 140, part(64, 70)));  // too short
-  filter(fragment_message(kAuthentication, 1, 1, 141, part(0, 64)));   // of another sample
-  EXPECT_FALSE(joiner.take());
-  filter(fragment_message(kAuthentication, 1, 2, 140, part(0, 128)));
+  const auto fragment = [&](std::uint8_t first, std::uint8_t count, std::uint8_t size,
+                            const Bytes& payload) {
+    return fragment_message(kAuthentication, first, count, size, payload);
+  };
+  EXPECT_FALSE(completed_by(fragment(3, 1, 140, part(128, 140))));
+  EXPECT_FALSE(completed_by(fragment(3, 1, 140, part(128, 140))));
+  EXPECT_FALSE(completed_by(fragment(2, 1, 140, part(64, 70)))) << "too short";
+  EXPECT_FALSE(completed_by(fragment(1, 1, 141, part(0, 64)))) << "of another sample";
   Bytes expected = data_message(0, 5, 16, sample);
   std::copy(kAuthentication.begin(), kAuthentication.end(), &expected[kBodyAt + 8]);
-  EXPECT_EQ(joiner.take(), expected);
-  EXPECT_FALSE(joiner.take());
+  EXPECT_EQ(completed_by(fragment(1, 2, 140, part(0, 128))), expected);
 }
 
-TEST(MessageFilterOfSamples, JoinsAtMostAFewSamplesAtATime) {
-  FragmentJoiner joiner;
-  const auto filter = [&](std::size_t sample, std::uint8_t first) {
+TEST_F(FragmentsOfAuthentication, AreKeptOfAFewSamples) {
+  const auto part = [](std::size_t sample, std::uint8_t first) {
     Bytes message = fragment_message(kAuthentication, first, 1, 192, Bytes(64));
     message[kBodyAt + 16] = static_cast<std::uint8_t>(sample);  // sequence number
-    EXPECT_EQ(filter_message(message, true, nullptr, &joiner), message.size());
+    return message;
   };
-  for (std::size_t i = 0; i <= FragmentJoiner::kMostSamples; ++i)
-    for (const std::uint8_t first : {std::uint8_t{1}, std::uint8_t{3}}) filter(i, first);
-  for (std::size_t i = FragmentJoiner::kMostSamples; i > 0; --i) {
-    filter(i, 2);
-    EXPECT_TRUE(joiner.take()) << i;
-  }
-  filter(0, 2);
-  EXPECT_FALSE(joiner.take()) << "the oldest was discarded";
+  for (std::size_t i = 0; i <= FragmentReassembly::kMostSamples; ++i)
+    for (const std::uint8_t first : {std::uint8_t{1}, std::uint8_t{3}})
+      EXPECT_FALSE(completed_by(part(i, first)));
+  for (std::size_t i = FragmentReassembly::kMostSamples; i > 0; --i)
+    EXPECT_TRUE(completed_by(part(i, 2))) << i;
+  EXPECT_FALSE(completed_by(part(0, 2))) << "the oldest was discarded";
 }
 
 Bytes gap_message(std::uint32_t start, std::uint32_t base) {
@@ -342,7 +344,7 @@ TEST(MessageFilterOfNumbers, SkipsAGapAheadOfWhatTheReaderWaitsFor) {
   SequenceWindow window;
   const auto passes = [&window](std::uint32_t start) {
     Bytes message = gap_message(start, start + 1);
-    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    EXPECT_EQ(filter_message(message, Protection::None, &window), message.size());
     return message[kKindAt] == 0x08;
   };
   EXPECT_TRUE(passes(1024));
@@ -358,7 +360,7 @@ TEST(MessageFilterOfNumbers, SkipsASampleAheadOfWhatAReliableReaderWaitsFor) {
   sample[kBodyAt + 18] = 1;  // number 65537
   const auto kind = [&] {
     Bytes message = sample;
-    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    EXPECT_EQ(filter_message(message, Protection::None, &window), message.size());
     return message[kKindAt];
   };
   EXPECT_EQ(kind(), 0x15) << "never asked: of a best-effort writer";
@@ -375,12 +377,12 @@ TEST(MessageFilterOfNumbers, AHeartbeatSkipsNoMoreThanAFewMillionNumbers) {
   for (const auto& [first, expected] :
        {std::pair{200u, 200u}, {4'000'000'000u, 100u + (1u << 22)}}) {
     Bytes message = heartbeat_message(first);
-    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    EXPECT_EQ(filter_message(message, Protection::None, &window), message.size());
     EXPECT_EQ(first_of(message), expected);
   }
   const SequenceWindow other;
   Bytes next = heartbeat_message(1'000'000);
-  EXPECT_EQ(filter_message(next, false, &other), next.size());
+  EXPECT_EQ(filter_message(next, Protection::None, &other), next.size());
   EXPECT_EQ(first_of(next), 1'000'000);
 }
 
@@ -399,7 +401,7 @@ TEST(MessageFilterOfNumbers, SkipsAnAnnouncementFarAhead) {
   for (const std::uint8_t number : {std::uint8_t{32}, std::uint8_t{33}}) {
     Bytes message = announcement(kPublications, {kDurability});
     message[kBodyAt + 16] = number;
-    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    EXPECT_EQ(filter_message(message, Protection::None, &window), message.size());
     EXPECT_EQ(message[kKindAt], number == 32 ? 0x15 : 0x7f);
   }
 }
@@ -411,7 +413,7 @@ TEST(MessageFilterOfNumbers, AWriterBehindAnotherSourceIsAnother) {
   Bytes source{0x0c, 1, 20, 0, 0, 0, 0, 0, 2, 3, 1, 15};
   source.resize(24, 9);
   message.insert(message.begin() + kKindAt, source.begin(), source.end());
-  EXPECT_EQ(filter_message(message, false, &window), message.size());
+  EXPECT_EQ(filter_message(message, Protection::None, &window), message.size());
   EXPECT_EQ(message[kKindAt + source.size()], 0x7f);
 }
 
@@ -489,32 +491,109 @@ TEST(MessageFilterOfSamples, TakesTimeStampsAway) {
   EXPECT_EQ(message[kKindAt + 1], 3);
 }
 
-/// A change would break the signature. Without DDS Security the prefix means nothing.
-TEST(MessageFilterOfSamples, DoesNotChangeWhatIsSignedIfTheParticipantIsSecured) {
-  Bytes message = users_data(3, kDisposed);
-  const Bytes prefix{0x33, 1, 4, 0, 0, 0, 0, 0};
-  message.insert(message.begin() + kKindAt, prefix.begin(), prefix.end());
-  const Bytes before = message;
-  EXPECT_EQ(filter_message(message, true), message.size());
-  EXPECT_EQ(message, before);
-  EXPECT_EQ(filter_message(message, false), message.size());
-  EXPECT_EQ(message[kKindAt + prefix.size()], 0x08);
+/// Submessages as in a message with DDS Security.
+Bytes message_of(const std::vector<Bytes>& submessages) {
+  const Bytes sample = users_data(3, kDisposed);
+  Bytes message(sample.begin(), sample.begin() + kKindAt);
+  for (const Bytes& submessage : submessages)
+    message.insert(message.end(), submessage.begin(), submessage.end());
+  return message;
+}
+Bytes submessage(std::uint8_t kind, const Bytes& body) {
+  Bytes bytes{kind, 1, static_cast<std::uint8_t>(body.size()), 0};
+  bytes.insert(bytes.end(), body.begin(), body.end());
+  return bytes;
+}
+Bytes disposal() {
+  const Bytes sample = users_data(3, kDisposed);
+  return {sample.begin() + kKindAt, sample.end()};
+}
+const Bytes kMessagePrefix = submessage(0x33, Bytes(20)),
+            kMessagePostfix = submessage(0x34, Bytes(20)), kPrefix = submessage(0x31, Bytes(20)),
+            kPostfix = submessage(0x32, Bytes(20));
+
+std::size_t passed(Bytes message, Protection protection) {
+  return filter_message(message, protection);
 }
 
-/// A stranger can put the prefix of a signed submessage in front of his own.
-TEST(MessageFilterOfSamples, TakesOnlyTheNextSubmessageOrTheMessageUpToItsPostfixAsSigned) {
-  const Bytes sample = users_data(3, kDisposed);
-  const Bytes data(sample.begin() + kKindAt, sample.end());
-  for (const Bytes& around : {Bytes{0x31, 0x32}, Bytes{0x33, 0x34}}) {
-    Bytes message(sample.begin(), sample.begin() + kKindAt);
-    for (const auto kind : around) {
-      message.insert(message.end(), {kind, 1, 4, 0, 0, 0, 0, 0});
-      message.insert(message.end(), data.begin(), data.end());
+/// A change would break the signature. Without DDS Security the prefix means nothing.
+TEST(MessageFilterOfSamples, DoesNotChangeWhatIsSignedIfTheParticipantIsSecured) {
+  for (const Bytes& signed_message : {message_of({kMessagePrefix, disposal(), kMessagePostfix}),
+                                      message_of({kPrefix, disposal(), kPostfix})}) {
+    for (const auto protection : {Protection::Profile, Protection::Messages}) {
+      Bytes message = signed_message;
+      EXPECT_EQ(filter_message(message, protection), message.size());
+      EXPECT_EQ(message, signed_message);
     }
-    EXPECT_EQ(filter_message(message, true), message.size());
-    EXPECT_EQ(message[kKindAt + 8], 0x15) << "signed";
-    EXPECT_EQ(message[kKindAt + 16 + data.size()], 0x08) << "not signed";
+    Bytes message = signed_message;
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kKindAt + 24], 0x08);
   }
+}
+
+/// A stranger can put the prefix of a protected submessage in front of his own.
+TEST(MessageFilterOfSamples, TakesOnlyTheProtectedSubmessageAsSigned) {
+  Bytes message = message_of({kPrefix, disposal(), kPostfix, disposal()});
+  EXPECT_EQ(filter_message(message, Protection::Profile), message.size());
+  EXPECT_EQ(message[kKindAt + 24], 0x15) << "signed";
+  EXPECT_EQ(message[kKindAt + 48 + disposal().size()], 0x08) << "not signed";
+}
+
+/// Fast DDS computes with the stated lengths before it checks a signature.
+TEST(MessageFilterOfSamples, DropsAnotherStructureThanThatOfDdsSecurity) {
+  const Bytes body = submessage(0x30, {0, 0, 0, 4, 1, 2, 3, 4});
+  const std::vector<Bytes> right{
+      message_of({kPrefix, body, kPostfix}),
+      message_of({kMessagePrefix, kPrefix, body, kPostfix, disposal(), kMessagePostfix}),
+      message_of({kMessagePrefix, body, kMessagePostfix})};
+  for (const Bytes& message : right)
+    EXPECT_EQ(passed(message, Protection::Messages), message.size());
+
+  Bytes open = disposal(), with_macs = submessage(0x32, Bytes(20));
+  open[2] = open[3] = 0;
+  with_macs[4 + 19] = 1;  // states one more MAC than it has
+  const Bytes long_body = submessage(0x30, {0xff, 0xff, 0xff, 0xff, 1, 2, 3, 4});
+  for (const Bytes& message :
+       {message_of({kMessagePrefix, disposal()}), message_of({kMessagePrefix, open}),
+        message_of({disposal(), kMessagePrefix, disposal(), kMessagePostfix}),
+        message_of({kMessagePrefix, disposal(), kMessagePostfix, disposal()}),
+        message_of({disposal(), kMessagePostfix}), message_of({kPrefix, body}),
+        message_of({kPrefix, open}), message_of({kPrefix, kPostfix}),
+        message_of({kPrefix, body, body, kPostfix}), message_of({kPrefix, long_body, kPostfix}),
+        message_of({kPrefix, body, with_macs}), message_of({body}), message_of({kPostfix}),
+        message_of({submessage(0x31, Bytes(16)), body, kPostfix})})
+    for (const auto protection : {Protection::Profile, Protection::Messages})
+      EXPECT_EQ(passed(message, protection), 0u) << testing::PrintToString(message);
+}
+
+/// Fast DDS 2.9 takes unsigned samples and heartbeats as those of the participant that they state.
+TEST(MessageFilterOfSamples, SkipsUnsignedOnesWhereEveryMessageIsSigned) {
+  const Bytes sample = users_data(5, {0, 1, 0, 0, 1, 2, 3, 4});
+  for (Bytes message : {sample, gap_message(5, 6), announcement(kPublications, {kDurability})}) {
+    const std::uint8_t kind = message[kKindAt];
+    EXPECT_EQ(filter_message(message, Protection::Profile), message.size());
+    EXPECT_EQ(message[kKindAt], kind);
+    EXPECT_EQ(filter_message(message, Protection::Messages), message.size());
+    EXPECT_EQ(message[kKindAt], 0x7f);
+  }
+}
+
+/// Fast DDS delivers to the reader that is stated, also from an unknown writer.
+TEST(MessageFilterOfSamples, SkipsDataOfAnotherWriterThanThatOfTheReader) {
+  const Bytes sample{0, 1, 0, 0, 1, 2, 3, 4};
+  const auto data = [&](const Bytes& reader, const Bytes& writer) {
+    Bytes message = users_data(5, sample);
+    std::copy(reader.begin(), reader.end(), &message[kBodyAt + 4]);
+    std::copy(writer.begin(), writer.end(), &message[kBodyAt + 8]);
+    static_cast<void>(filter_message(message));
+    return message[kKindAt];
+  };
+  const Bytes of_authentication{0, 2, 1, 0xc4}, users{0, 0, 1, 7};
+  EXPECT_EQ(data(of_authentication, {0, 0, 0, 0}), 0x7f);
+  EXPECT_EQ(data(of_authentication, {0, 0, 1, 2}), 0x7f);
+  EXPECT_EQ(data({0, 0, 3, 0xc7}, {0, 2, 0, 0xc2}), 0x7f);
+  EXPECT_EQ(data(users, {0, 0, 1, 2}), 0x15);
+  EXPECT_EQ(data({0, 0, 0, 0}, {0, 0, 1, 2}), 0x15);
 }
 
 TEST(MessageFilterOfSamples, SkipsAShortLivelinessMessage) {

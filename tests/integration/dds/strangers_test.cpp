@@ -161,6 +161,24 @@ TEST_F(StrangersWithSecurity, TokensWithoutEndEndNoProcess) {
   EXPECT_EQ(starts(), 1) << "abbe-dds was started again";
 }
 
+/// Fast DDS 2.9 takes an unsigned sample as that of the writer whose GUID it states, and every
+/// participant announces its GUID in clear.
+TEST_F(StrangersWithSecurity, UnsignedSamplesWithTheGuidOfAWriterAreIgnored) {
+  ASSERT_TRUE(watcher.wait_for(R"({"topic":"abbe/v1/Compensation")", {}, kHandshake));
+  for (Process* subscriber : {&fast, &cyclone})
+    ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V", {}, kHandshake)) << subscriber->transcript();
+  {
+    Process hostile({ABBE_HOSTILE_PEER, domain_.text(), "1", "forged"});
+    for (int n = 0; n < 10; ++n) ASSERT_TRUE(hostile.wait_for("sent ", Clock::now()));
+  }
+  for (Process* subscriber : {&fast, &cyclone}) {
+    EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now())) << subscriber->transcript();
+    EXPECT_FALSE(has_fake(*subscriber)) << "a forged vector was applied";
+  }
+  EXPECT_EQ(watcher.transcript().find("0.000999,0.000999"), std::string::npos);
+  EXPECT_EQ(starts(), 1) << "abbe-dds was started again";
+}
+
 /// Cyclone DDS 0.10 ended after the second kill: it got the keys of known writers again and again.
 TEST_F(StrangersWithSecurity, BothSubscribersReturnAfterEveryKillOfAbbeDds) {
   for (int kill = 0; kill < 4; ++kill) {

@@ -6,11 +6,18 @@
 ///   in announcements the filter replaces their ids by an unused id, which every implementation
 ///   skips.
 /// - Values of announcements, and messages of authentication, that state more elements or longer
-///   text than they have: Fast DDS takes memory for all, or reads on behind them. An announcement
-///   with one is left out. Fragments of messages of authentication are joined before the check.
+///   text than they have: Fast DDS takes memory for all, or reads beyond the value. Such an
+///   announcement is skipped. Fragments of messages of authentication are reassembled before the
+///   check.
+/// - Samples for a reader of another kind than their writer, whose content would not be checked.
 /// - A statistics submessage (80h, specific to Fast DDS) with a length other than the one that Fast
 ///   DDS asserts. The filter cuts such a submessage off at the end of a message, as Fast DDS does
 ///   itself. No valid sender puts one elsewhere; a message with one elsewhere is dropped.
+///
+/// With DDS Security:
+/// - Unsigned samples and heartbeats, which Fast DDS takes for those of the participant whose GUID
+///   they state, if every message must be signed (Protection::Messages).
+/// - Messages with another structure than that of DDS Security (protected_structure.hpp).
 ///
 /// Without DDS Security, from any matched writer:
 /// - A sample without content: an instance is disposed or unregistered. Fast DDS aborts if it cannot
@@ -44,30 +51,47 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "abbe/dds/sequence_window.hpp"
 
 namespace abbe::dds {
 
-class FragmentJoiner;
+class FragmentReassembly;
+
+/// Which messages DDS Security signs.
+enum class Protection {
+  None,     ///< DDS Security is off
+  Profile,  ///< by the governance of a site's profile, which the filter does not know
+  Messages  ///< every message: the governance that `abbe dds keys` makes (rtps_protection_kind)
+};
+
+/// What the filter keeps and completes of fragments.
+struct Reassembly {
+  FragmentReassembly& fragments;
+  /// Messages that a fragment of the filtered message completed. They must be filtered, too, and
+  /// passed to Fast DDS.
+  std::vector<std::vector<std::uint8_t>> complete;
+};
 
 /// Changes an RTPS message [DDSI-RTPS 2.5, 8.3.4, 9.4.5.4 and 9.4.2.11] in place. Returns how many
 /// of its bytes may be passed to Fast DDS; 0: drop the message. Never reads beyond the message.
-/// `secured`: the participant uses DDS Security. Then samples and time stamps behind a signature's
-/// prefix are not changed: Fast DDS drops what a stranger puts there.
+/// `protection` of the participant. What is protected by a signature is not changed: Fast DDS drops
+/// what a stranger puts there. With Protection::Messages nothing else passes but announcements of
+/// participants and messages of authentication.
 /// `window`: what the readers of this participant wait for; nullptr: numbers are not limited by it.
-/// `joiner`: takes the fragments of messages of authentication. What it joins must be filtered, too,
-/// and passed to Fast DDS. nullptr: they are skipped.
-[[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message, bool secured = false,
+/// `reassembly`: of messages of authentication; nullptr: their fragments are skipped.
+[[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message,
+                                         Protection protection = Protection::None,
                                          const SequenceWindow* window = nullptr,
-                                         FragmentJoiner* joiner = nullptr) noexcept;
+                                         Reassembly* reassembly = nullptr) noexcept;
 
 /// Wraps `low_level`: a transport that passes received messages through the filter to Fast DDS.
 /// `window`: one for all transports of the participant; nullptr with DDS Security, which hides the
 /// numbers from the filter, and strangers from the readers.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>
 with_message_filter(
-    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level, bool secured,
-    std::shared_ptr<SequenceWindow> window);
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level,
+    Protection protection, std::shared_ptr<SequenceWindow> window);
 
 }  // namespace abbe::dds

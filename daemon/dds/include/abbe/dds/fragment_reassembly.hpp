@@ -1,6 +1,6 @@
 #pragma once
-/// Joins the fragments [DDSI-RTPS 2.5, 8.3.8.3] of messages of authentication. They come before any
-/// key is checked, and a message can only be checked as a whole.
+/// Reassembles messages of authentication from their fragments [DDSI-RTPS 2.5, 8.3.8.3]. They come
+/// before any key is checked, and a message can only be checked as a whole.
 ///
 /// Thread-safe: a participant may receive on several channels.
 
@@ -25,16 +25,15 @@ struct Fragment {
   std::span<const std::uint8_t> payload;
 };
 
-class FragmentJoiner {
+class FragmentReassembly {
  public:
   /// A certificate and its permissions take 2 to 6 kB.
-  static constexpr std::size_t kLongestSample = 32768;
+  static constexpr std::size_t kLongestSample = 60000;
   /// Samples of which fragments are missing. When one more begins, the oldest is discarded.
   static constexpr std::size_t kMostSamples = 64;
 
-  void add(const Fragment& fragment);
-  /// An RTPS message with one DATA submessage: the oldest sample that has become whole.
-  [[nodiscard]] std::optional<std::vector<std::uint8_t>> take();
+  /// If it completes a sample: an RTPS message with the sample in one DATA submessage.
+  [[nodiscard]] std::optional<std::vector<std::uint8_t>> add(const Fragment& fragment);
 
  private:
   struct Sample {
@@ -42,14 +41,13 @@ class FragmentJoiner {
     std::array<std::uint8_t, 16> ids;
     std::uint32_t fragment_size;
     std::vector<std::uint8_t> message;  ///< with room for the whole sample
-    std::vector<bool> is_here;          ///< by number of the fragment
+    std::vector<bool> received;         ///< by number of the fragment
     std::size_t missing;
   };
   Sample* sample_of(const Fragment& fragment);
 
   std::mutex mutex_;
-  std::deque<Sample> begun_;                     ///< guarded by mutex_
-  std::deque<std::vector<std::uint8_t>> whole_;  ///< guarded by mutex_
+  std::deque<Sample> incomplete_;  ///< guarded by mutex_
 };
 
 }  // namespace abbe::dds

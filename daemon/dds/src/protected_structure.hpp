@@ -1,0 +1,32 @@
+#pragma once
+/// The structure of messages with DDS Security [DDS Security 1.1, 7.3.6.6 and 7.3.7]. Fast DDS 2.9
+/// computes with lengths that a message only states before it checks a signature, so a message with
+/// another structure must be dropped:
+///     SRTPS_PREFIX, submessages with explicit lengths, SRTPS_POSTFIX     a signed message
+///     SEC_PREFIX, one submessage with an explicit length, SEC_POSTFIX    a protected submessage
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace abbe::dds {
+
+/// Follows the submessages of one message from the first to the last.
+class ProtectedStructure {
+ public:
+  /// `first` of the message. `open`: the length is 0, "up to the end". Returns whether the submessage
+  /// is protected: Fast DDS drops it if its signature is wrong. nullopt: the structure is wrong.
+  [[nodiscard]] std::optional<bool> next(std::uint8_t kind, std::span<const std::uint8_t> body,
+                                         bool first, bool open);
+  /// What began has ended.
+  [[nodiscard]] bool is_complete() const;
+
+ private:
+  enum class Message { Plain, Signed, Ended };        ///< behind SRTPS_PREFIX and SRTPS_POSTFIX
+  enum class Submessage { None, Begun, HasContent };  ///< behind SEC_PREFIX and its content
+
+  Message message_ = Message::Plain;
+  Submessage submessage_ = Submessage::None;
+};
+
+}  // namespace abbe::dds

@@ -10,7 +10,7 @@ namespace abbe::dds {
 
 /// Whether the value of the parameter `id` of an announcement [DDSI-RTPS 2.5, 9.6.3; DDS Security
 /// 1.1, 7.4.1] has the length of its type, and the elements and the text that it states. True for
-/// parameters that Fast DDS does not read. An announcement that Fast DDS refuses stays in its memory.
+/// parameters that Fast DDS does not read. An announcement that Fast DDS refuses stays in memory.
 [[nodiscard]] bool has_valid_lengths(std::uint16_t id, std::span<const std::uint8_t> value,
                                      bool little_endian);
 

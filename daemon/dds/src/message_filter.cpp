@@ -131,8 +131,8 @@ bool is_countable(const Submessage& submessage, std::size_t at) {
   return at + 8 <= submessage.body.size() && submessage.reader().sequence_number(at) < kMost;
 }
 
-/// Finds the payload, and blanks the key hash of a user's sample. nullopt if the submessage does not conform to the
-/// standard: Fast DDS could read its parameters at another offset.
+/// Finds the payload, and blanks the key hash of a user's sample. nullopt if the submessage does not
+/// conform to the standard: Fast DDS could read its parameters at another offset.
 std::optional<DataLayout> read_data(const Submessage& data, bool users) {
   Reader reader = data.reader();
   const std::size_t to_inline_qos = reader.u16(2);
@@ -301,8 +301,8 @@ void add_to(Reassembly& reassembly, const Submessage& fragment) {
 /// Only the messages of DDS Security before it encrypts may be fragments: a message of abbe fits
 /// into one DATA submessage, and Fast DDS checks fragments insufficiently: without a payload behind
 /// their inline QoS it frees memory that is not its own. Those of authentication are reassembled
-/// and then checked. A fragment of an announcement cannot be checked alone; a GAP of its number lets the
-/// reader go on to later announcements.
+/// and then checked. A fragment of an announcement cannot be checked alone; a GAP of its number lets
+/// the reader go on to later announcements.
 void check_fragment(const Submessage& fragment) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kFragmentsAt = 20, kShortest = 32;
   const Bytes body = fragment.body;
@@ -365,8 +365,8 @@ void limit_heartbeat(const Submessage& heartbeat) {
   if (allowed < first - next) reader.put_sequence_number(kFirstAt, next + allowed);
 }
 
-/// Fast DDS delivers to the reader that a submessage names, from a writer that it does not know, too:
-/// the content would be checked as that of another writer.
+/// Fast DDS delivers to the reader that a submessage names, also from an unknown writer: the content
+/// would be checked as that of another writer.
 bool is_for_its_reader(const Submessage& submessage) {
   const bool is_data = submessage.kind == kData || submessage.kind == kDataFrag;
   const bool is_of_writer = is_data || submessage.kind == kHeartbeat || submessage.kind == kGap ||
@@ -385,8 +385,7 @@ bool is_for_its_reader(const Submessage& submessage) {
 }
 
 /// With keys Fast DDS 2.9 accepts samples without signature as those of the participant whose GUID
-/// they state. Nobody else signs: announcements of participants and authentication come before there
-/// are keys for it.
+/// they state. Announcements of participants and authentication come before there are keys to sign.
 bool may_be_unsigned(const Submessage& submessage) {
   switch (submessage.kind) {
     case kData:

@@ -13,8 +13,8 @@
 //                                           its own, every second
 // It announces writers and readers of all topics of abbe under changing GUIDs, and sends DATA,
 // DATA_FRAG, HEARTBEAT, GAP, ACKNACK and all other submessages of the standard with random content
-// to the participants 0 to 15 of the domain on this computer. Except with `forged`, it uses no GUID of
-// another participant. It runs until it is killed, prints "started" when it begins to send, and
+// to the participants 0 to 15 of the domain on this computer. Except with `forged`, it uses no GUID
+// of another participant. It runs until it is killed, prints "started" when it begins to send, and
 // "sent N" every 200 messages.
 #include <arpa/inet.h>
 #include <netinet/in.h>

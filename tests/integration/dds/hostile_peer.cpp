@@ -67,6 +67,7 @@ class HostilePeer {
     numbers_.fill(0);
     for (int i = 0; i < 2; ++i) announce_participant();
     for (int i = 0; i < 2; ++i) announce_endpoints();
+    if (mode_.empty()) send_valid_samples();
 
     for (int i = 0; i < 2000; ++i) {
       send(hostile_message());
@@ -117,6 +118,19 @@ class HostilePeer {
     Bytes bytes(below(bound) / 4 * 4);
     for (auto& b : bytes) b = any8();
     return bytes;
+  }
+  /// While the participant is discovered: a reader that is matched delivers them. Later a number near
+  /// the largest keeps it from the smaller ones.
+  void send_valid_samples() {
+    constexpr auto kTopic = static_cast<std::size_t>(daemon::Topic::Snapshot);
+    for (int i = 0; i < 50; ++i) {
+      auto snapshot = test::snapshot(any());
+      snapshot.machine("hostile-" + std::to_string(below(200)));
+      RtpsMessage m(prefix_);
+      m.data(entity(kTopic, true), ++numbers_[kTopic]).append(bytes_of(snapshot)).end();
+      to_every_port(m.bytes(), 1);
+      std::this_thread::sleep_for(std::chrono::milliseconds{4});
+    }
   }
   /// Most of the time the next number of the writer, so that its samples are delivered.
   std::int64_t number_of(std::size_t writer) {

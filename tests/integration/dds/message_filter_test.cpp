@@ -28,7 +28,7 @@ Bytes data_message(std::uint8_t writer, std::uint8_t flags, std::uint16_t to_inl
   const bool little_endian = (flags & 1) != 0;
   Bytes body{0, 0};  // extra flags
   append_u16(body, to_inline_qos, little_endian);
-  body.insert(body.end(), {0, 0, writer, 0xc7, 0, 0, writer, 0xc2, 0, 0, 0, 0, 1, 0, 0, 0});
+  body.insert(body.end(), {0, 0, 0, 0, 0, 0, writer, 0xc2, 0, 0, 0, 0, 1, 0, 0, 0});
   body.insert(body.end(), rest.begin(), rest.end());
   Bytes message{'R', 'T', 'P', 'S', 2, 3, 1, 15, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   message.insert(message.end(), {kind, flags});

@@ -14,6 +14,7 @@ namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::mfb;
 using namespace abbe::tests::mfb;
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -156,6 +157,32 @@ TEST(MfbJudge, NotesTouchesThatWereSetAside) {
   ASSERT_TRUE(verdict) << verdict.error().text;
   EXPECT_THAT(verdict->notes,
               Contains(HasSubstr("X1: hole 5, k = 2 is excluded: it is 52 um off its feature")));
+}
+
+TEST(MfbJudge, AsksByNameForABarThatIsFarFrom20C) {
+  const auto at = [](double temperature_C) {
+    Identification found = usual_identification();
+    found.observations.bar.expansion = Expansivity{11.5e-6, 0.2e-6};
+    found.observations.passes.back().temperature_K = temperature_C + 273.15;
+    return found;
+  };
+  for (const double temperature_C : {68.9, 35.0, 45.0, -4.0}) {
+    const Identification found = at(temperature_C);
+    const auto verdict = judge(found, nullptr).value();
+    EXPECT_THAT(verdict.causes, Contains(std::string(kBarTemperature)));
+    EXPECT_THAT(verdict.reasons, Contains(AllOf(HasSubstr("the temperature of the bar is "),
+                                                HasSubstr(" um/m; check temperature_C"))));
+    const auto accepted = judge(found, nullptr, {.accept_bar_temperature = true}).value();
+    EXPECT_TRUE(accepted.accepted);
+    EXPECT_THAT(accepted.notes, Contains(HasSubstr("explicitly accepted")));
+  }
+  EXPECT_TRUE(judge(at(31.0), nullptr)->accepted);
+  EXPECT_TRUE(judge(at(9.0), nullptr)->accepted);
+}
+
+TEST(MfbJudge, StatesOnWhatTheScaleDepends) {
+  EXPECT_THAT(judge(usual_identification(), nullptr)->notes,
+              Contains(HasSubstr("the scale of the model is that of the bar")));
 }
 
 TEST(MfbJudge, StatesThatTheSequenceIsNotFittedAgain) {

@@ -1,5 +1,10 @@
 #include "abbe/calib/mfb/judge.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "abbe/calib/environment/thermal_expansion.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -56,6 +61,46 @@ void judge_set_aside(Verdict& verdict, const Identification& found) {
   }
 }
 
+/// Refuses a temperature of the bar that is not that of a workshop. An error of it changes all
+/// lengths alike, which no residual shows.
+void judge_temperature(Verdict& verdict, const Observations& o, bool accepted) {
+  const auto from_reference_K = [](const PassObservation& pass) {
+    return std::abs(pass.temperature_K - kReferenceTemperature_K);
+  };
+  const auto worst = std::ranges::max_element(o.passes, {}, from_reference_K);
+  if (worst == o.passes.end() || from_reference_K(*worst) <= kMostFromReference_K) {
+    return;
+  }
+  const double off_K = worst->temperature_K - kReferenceTemperature_K;
+  constexpr double kReference_C = 20.0;
+  std::string seen =
+      message(o.plan.measurements[worst->measurement].name, ": the temperature of the bar is ",
+              kReference_C + off_K, " C, ", std::abs(off_K), " K from that of its calibration");
+  if (o.bar.expansion) {
+    seen +=
+        message(": all lengths change by ", 1e6 * o.bar.expansion->alpha_per_K * off_K, " um/m");
+  }
+  if (accepted) {
+    verdict.notes.push_back(message(seen, ", explicitly accepted"));
+  } else {
+    verdict.refuse(
+        kBarTemperature,
+        message(seen, "; check temperature_C, in degrees Celsius; if it is right, accept ",
+                kBarTemperature));
+  }
+}
+
+void note_scale(Verdict& verdict, const Bar& bar) {
+  const std::string per_K = bar.expansion
+                                ? message(1e6 * bar.expansion->alpha_per_K, " um/m")
+                                : "its expansion, which bar.toml does not state (steel: 11.5 um/m)";
+  verdict.notes.push_back(
+      message("the scale of the model is that of the bar: an error of 1 um/m of its calibration "
+              "changes all "
+              "lengths by 1 um/m, an error of 1 K of its temperature by ",
+              per_K));
+}
+
 }  // namespace
 
 Result<Verdict> judge(const Identification& found, const VolumetricModel* active,
@@ -68,6 +113,8 @@ Result<Verdict> judge(const Identification& found, const VolumetricModel* active
   Verdict verdict = decide(found.model, *figures, options.limits, active);
   judge_chi_square(verdict, found);
   judge_set_aside(verdict, found);
+  judge_temperature(verdict, found.observations, options.accept_bar_temperature);
+  note_scale(verdict, found.observations.bar);
   note_set_aside(verdict, found);
   note_small_residuals(verdict, found.solution.statistics);
   verdict.notes.insert(verdict.notes.end(), found.notes.begin(), found.notes.end());

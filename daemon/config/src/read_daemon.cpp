@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/mfb/judge.hpp"
 #include "abbe/calib/otf/orientation.hpp"
 #include "readers.hpp"
 
@@ -147,10 +148,13 @@ void read_gate(ClassifiedSection& root, Config& out) {
   if (section.get("accept", gate.accept)) {
     for (const auto& name : gate.accept)
       if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume &&
-          name != calib::kScaleChange && name != calib::otf::kPathOrientation)
-        section.fault("accept", fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\" or \"{}\"",
-                                            name, calib::evemu::kShapeOnly, calib::kSmallerVolume,
-                                            calib::kScaleChange, calib::otf::kPathOrientation));
+          name != calib::kScaleChange && name != calib::otf::kPathOrientation &&
+          name != calib::mfb::kBarTemperature)
+        section.fault(
+            "accept",
+            fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\", \"{}\" or \"{}\"", name,
+                        calib::evemu::kShapeOnly, calib::kSmallerVolume, calib::kScaleChange,
+                        calib::otf::kPathOrientation, calib::mfb::kBarTemperature));
   }
 
   section.close();

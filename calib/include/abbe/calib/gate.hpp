@@ -82,7 +82,8 @@ struct Verdict {
   std::vector<std::string> reasons;  ///< one sentence with numbers for each rule that is not met
   /// Machine-readable identifiers of `reasons`, one each in the same order: the name of a Cause of
   /// the method's lack_of_fit.hpp, or one of held-out, nowhere, size, slope, volume, scale-change,
-  /// growth, uncertainty, orientation, outliers, shape-only, damage.
+  /// growth, uncertainty, orientation, outliers, shape-only, damage,
+  /// bar-temperature.
   std::vector<std::string> causes;
   std::vector<std::string> notes;  ///< further information, no reason to refuse
   HeldOutFigures held_out;

@@ -9,14 +9,23 @@
 /// others, and the active model enters as y - (its errors at the touches). A group that the others do
 /// not predict to ten times the noise of its points is not left out. Units: m, rad; k = 1. Pure.
 
+#include <string_view>
+
 #include "abbe/calib/gate.hpp"
 #include "abbe/calib/mfb/identify.hpp"
 
 namespace abbe::calib::mfb {
 
+/// Entry in the configuration that permits a bar more than kMostFromReference_K from 20 C.
+inline constexpr std::string_view kBarTemperature = "bar-temperature";
+/// A bar farther from 20 C is asked for by name: degrees Fahrenheit and typing errors are no
+/// temperatures of a workshop, and residuals show no wrong one.
+inline constexpr double kMostFromReference_K = 12.0;
+
 struct JudgeOptions {
   GateLimits limits{};
   SolveOptions solve{};
+  bool accept_bar_temperature = false;  ///< see kBarTemperature
 };
 
 /// `active`, the model in use, may be null. It is compared at the points inside its validity volume,
@@ -27,7 +36,8 @@ struct JudgeOptions {
                                               const VolumetricModel* active,
                                               const SolveOptions& = {});
 
-/// The verdict from held_out(), chi-square with its likely cause, and the limits of the gate.
+/// The verdict from held_out(), chi-square with its likely cause, the temperature of the bar, and the
+/// limits of the gate. A note says on what the scale of the model depends.
 [[nodiscard]] Result<Verdict> judge(const Identification&, const VolumetricModel* active,
                                     const JudgeOptions& = {});
 

@@ -203,7 +203,8 @@ struct GateConfig {
   /// - "evemu-shape-only": a model from a ball array whose rotation about Ball1 is not referenced;
   /// - "smaller-volume": a model whose validity volume is smaller than that of the active model;
   /// - "scale-change": a model whose scale differs from that of the active model;
-  /// - "path-orientation": a path file that may be rotated (calib/otf/orientation).
+  /// - "path-orientation": a path file that may be rotated (calib/otf/orientation);
+  /// - "bar-temperature": a bar more than 12 K from 20 C (calib/mfb/judge).
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;

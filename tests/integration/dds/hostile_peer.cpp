@@ -119,15 +119,23 @@ class HostilePeer {
     for (auto& b : bytes) b = any8();
     return bytes;
   }
-  /// While the participant is discovered: a reader that is matched delivers them. Later a number near
-  /// the largest keeps it from the smaller ones.
+  /// Of a machine of its own, while the participant is discovered: a reader that is matched delivers
+  /// them. Later a number near the largest keeps it from the smaller ones.
   void send_valid_samples() {
-    constexpr auto kTopic = static_cast<std::size_t>(daemon::Topic::Snapshot);
+    constexpr auto kIdentity = static_cast<std::size_t>(daemon::Topic::Identity),
+                   kSnapshot = static_cast<std::size_t>(daemon::Topic::Snapshot);
+    const std::string name = "hostile-" + std::to_string(below(200));
     for (int i = 0; i < 50; ++i) {
-      auto snapshot = test::snapshot(any());
-      snapshot.machine("hostile-" + std::to_string(below(200)));
       RtpsMessage m(prefix_);
-      m.data(entity(kTopic, true), ++numbers_[kTopic]).append(bytes_of(snapshot)).end();
+      auto identity = test::identity(any());
+      identity.machine(name);
+      identity.machine_id(name);
+      const std::int64_t n = ++numbers_[kIdentity];
+      m.data(entity(kIdentity, true), n).append(bytes_of(identity)).end();
+      m.heartbeat(entity(kIdentity, true), n, n, ++count_);
+      auto snapshot = test::snapshot(any());
+      snapshot.machine(name);
+      m.data(entity(kSnapshot, true), ++numbers_[kSnapshot]).append(bytes_of(snapshot)).end();
       to_every_port(m.bytes(), 1);
       std::this_thread::sleep_for(std::chrono::milliseconds{4});
     }

@@ -96,8 +96,7 @@ void note_scale(Verdict& verdict, const Bar& bar) {
                                 : "its expansion, which bar.toml does not state (steel: 11.5 um/m)";
   verdict.notes.push_back(
       message("the scale of the model is that of the bar: an error of 1 um/m of its calibration "
-              "changes all "
-              "lengths by 1 um/m, an error of 1 K of its temperature by ",
+              "changes all lengths by 1 um/m, an error of 1 K of its temperature by ",
               per_K));
 }
 

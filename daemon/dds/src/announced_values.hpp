@@ -1,5 +1,5 @@
 #pragma once
-/// Checks the lengths inside the values that a stranger announces. Fast DDS 2.9 reads text behind
+/// Checks the lengths inside the values that a stranger announces. Fast DDS 2.9 reads text beyond
 /// the end of a value, and takes memory for as many elements as the value states: four octets are
 /// enough for 8 GB.
 

@@ -164,7 +164,7 @@ void limit_lease(Reader& list, std::size_t offset) {
 /// What becomes of an announcement.
 enum class Announcement {
   Passes,       ///< without the parameters that must not be read, and with a limited lease
-  Malformed,    ///< a value states a length that it does not have
+  Malformed,    ///< a value has a wrong length, or the endpoint is another participant's
   DropMessage,  ///< the list does not conform to the standard: the message must be dropped
 };
 

@@ -27,7 +27,7 @@ struct Fragment {
 
 class FragmentReassembly {
  public:
-  /// A certificate and its permissions take 2 to 6 kB.
+  /// Fits into one DATA submessage. A certificate and its permissions take 2 to 6 kB.
   static constexpr std::size_t kLongestSample = 60000;
   /// Samples of which fragments are missing. When one more begins, the oldest is discarded.
   static constexpr std::size_t kMostSamples = 64;

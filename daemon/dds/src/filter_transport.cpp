@@ -45,7 +45,7 @@ class MessageFilter final : public rtps::ChainingTransport {
     std::copy_n(bytes, size, buffer.begin());
     Reassembly reassembly{fragments_, {}};
     pass(std::span(buffer).first(size), &reassembly, next, local, remote);
-    for (const auto& message : reassembly.complete) {
+    for (const auto& message : reassembly.messages) {
       std::ranges::copy(message, buffer.begin());
       pass(std::span(buffer).first(message.size()), nullptr, next, local, remote);
     }

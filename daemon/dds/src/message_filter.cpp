@@ -229,7 +229,7 @@ bool is_plain_cdr(Bytes payload) {
 }
 
 /// Whether Fast DDS can read `payload` as a message of authentication.
-bool is_authentication(Bytes payload) {
+bool is_readable_authentication(Bytes payload) {
   constexpr std::size_t kEncapsulationBytes = 4;
   return payload.size() >= kEncapsulationBytes && is_plain_cdr(payload) &&
          authentication_has_valid_lengths(payload.subspan(kEncapsulationBytes), payload[1] == 1);
@@ -275,10 +275,29 @@ bool check_data(const Submessage& data) {
     const bool short_liveliness =
         writer == kLivelinessWriter && payload < kShortestLivelinessPayload;
     if (payload == 0 || short_liveliness ||
-        (writer == kAuthenticationWriter && !is_authentication(data.body.last(payload))))
+        (writer == kAuthenticationWriter && !is_readable_authentication(data.body.last(payload))))
       data.kind = kSkipped;
   }
   return true;
+}
+
+/// `submessage` is one that passes.
+bool is_authentication(const Submessage& submessage) {
+  return submessage.kind == kData && entity_id(submessage.body, 8) == kAuthenticationWriter;
+}
+
+/// Fast DDS drops the rest of a message at the first signed submessage for which it has no key yet.
+/// Cyclone DDS may send its last message of authentication, which gives the key, behind one.
+void pass_alone(const Submessage& authentication) {
+  std::vector<std::uint8_t> message(kHeaderBytes + kSubmessageHeaderBytes);
+  std::ranges::copy(authentication.header, message.begin());
+  message[kHeaderBytes] = authentication.kind;
+  message[kHeaderBytes + 1] = authentication.flags;
+  Reader(message, authentication.has(kLittleEndian))
+      .put_u16(kHeaderBytes + 2, static_cast<std::uint16_t>(authentication.body.size()));
+  message.insert(message.end(), authentication.body.begin(), authentication.body.end());
+  authentication.reassembly->messages.push_back(std::move(message));
+  authentication.kind = kSkipped;
 }
 
 /// A fragment whose numbers are checked.
@@ -295,7 +314,7 @@ void add_to(Reassembly& reassembly, const Submessage& fragment) {
                 .payload = fragment.body.subspan(kPayloadAt)};
   std::ranges::copy(fragment.header, part.header.begin());
   if (auto message = reassembly.fragments.add(part))
-    reassembly.complete.push_back(*std::move(message));
+    reassembly.messages.push_back(*std::move(message));
 }
 
 /// Only the messages of DDS Security before it encrypts may be fragments: a message of abbe fits
@@ -448,6 +467,7 @@ std::size_t filter_message(std::span<std::uint8_t> message, Protection protectio
                            const SequenceWindow* window, Reassembly* reassembly) noexcept {
   if (message.size() < kHeaderBytes) return 0;
   ProtectedStructure structure;
+  bool any_signed = false;
   std::array<std::uint8_t, kHeaderBytes> header{};
   std::copy_n(message.begin(), kHeaderBytes, header.begin());
 
@@ -477,6 +497,7 @@ std::size_t filter_message(std::span<std::uint8_t> message, Protection protectio
       const auto found = structure.next(kind, body, first, open);
       if (!found) return 0;
       is_signed = *found;
+      any_signed |= is_signed;
     }
     const Submessage submessage{kind, flags, body, is_signed, header, window, reassembly};
     const bool passes =
@@ -486,6 +507,8 @@ std::size_t filter_message(std::span<std::uint8_t> message, Protection protectio
       kind = kSkipped;
     else if (!check(submessage))
       return 0;
+    else if (any_signed && !is_signed && reassembly != nullptr && is_authentication(submessage))
+      pass_alone(submessage);
   }
   return structure.is_complete() ? message.size() : 0;
 }

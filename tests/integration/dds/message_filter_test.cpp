@@ -250,9 +250,9 @@ struct FragmentsOfAuthentication : testing::Test {
     EXPECT_EQ(filter_message(fragment, Protection::Messages, nullptr, &reassembly),
               fragment.size());
     EXPECT_EQ(fragment[kKindAt], 0x7f) << "not passed as a fragment";
-    EXPECT_LE(reassembly.complete.size(), 1u);
-    if (reassembly.complete.empty()) return std::nullopt;
-    return reassembly.complete.front();
+    EXPECT_LE(reassembly.messages.size(), 1u);
+    if (reassembly.messages.empty()) return std::nullopt;
+    return reassembly.messages.front();
   }
   FragmentReassembly fragments;
 };
@@ -537,6 +537,33 @@ TEST(MessageFilterOfSamples, TakesOnlyTheProtectedSubmessageAsSigned) {
   EXPECT_EQ(filter_message(message, Protection::Profile), message.size());
   EXPECT_EQ(message[kKindAt + 24], 0x15) << "signed";
   EXPECT_EQ(message[kKindAt + 48 + disposal().size()], 0x08) << "not signed";
+}
+
+/// Fast DDS drops a message at a signed submessage whose key it does not have. The last message of
+/// authentication, which gives the key, may be behind one of Cyclone DDS.
+TEST(MessageFilterOfSamples, PassesAuthenticationBehindASignedSubmessageAlone) {
+  Bytes payload{0, 1, 0, 0};
+  payload.resize(204);
+  payload[4 + 96] = 1;  // length of an empty class with its NUL; no tokens
+  Bytes alone = data_message(0, 5, 16, payload);
+  std::copy(kAuthentication.begin(), kAuthentication.end(), &alone[kBodyAt + 8]);
+  const Bytes authentication(alone.begin() + kKindAt, alone.end());
+
+  const auto filtered = [](Bytes& message) {
+    FragmentReassembly fragments;
+    Reassembly reassembly{fragments, {}};
+    EXPECT_EQ(filter_message(message, Protection::Messages, nullptr, &reassembly), message.size());
+    return reassembly.messages;
+  };
+  Bytes behind = message_of({kPrefix, disposal(), kPostfix, authentication});
+  EXPECT_EQ(filtered(behind), std::vector<Bytes>({alone}));
+  EXPECT_EQ(behind[behind.size() - authentication.size()], 0x7f);
+
+  for (const Bytes& first : {alone, message_of({authentication, kPrefix, disposal(), kPostfix})}) {
+    Bytes message = first;
+    EXPECT_EQ(filtered(message), std::vector<Bytes>{});
+    EXPECT_EQ(message, first);
+  }
 }
 
 /// Fast DDS computes with the stated lengths before it checks a signature.

@@ -84,8 +84,8 @@ VectorCount counted_by(Process& counter) {
 
 class StrangersWithSecurity : public Strangers {
  protected:
-  /// On a busy computer a message of the handshake may be lost. Neither implementation sends it
-  /// again before the lease of the participant, 40 s, has ended.
+  /// On a busy computer a message of authentication may be lost. Cyclone DDS does not send its last
+  /// one again before the lease of the participant, 40 s, has ended.
   static constexpr std::chrono::seconds kHandshake{90};
 
   void SetUp() override { start_feeder({"--security", keys}); }

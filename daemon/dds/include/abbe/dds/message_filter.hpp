@@ -66,12 +66,12 @@ enum class Protection {
   Messages  ///< every message: the governance that `abbe dds keys` makes (rtps_protection_kind)
 };
 
-/// What the filter keeps and completes of fragments.
+/// Messages of authentication that the filter takes out of the filtered message.
 struct Reassembly {
   FragmentReassembly& fragments;
-  /// Messages that a fragment of the filtered message completed. They must be filtered, too, and
-  /// passed to Fast DDS.
-  std::vector<std::vector<std::uint8_t>> complete;
+  /// Those that a fragment completed, and those behind a signed submessage. They must be filtered,
+  /// too, and passed to Fast DDS behind the filtered message.
+  std::vector<std::vector<std::uint8_t>> messages;
 };
 
 /// Changes an RTPS message [DDSI-RTPS 2.5, 8.3.4, 9.4.5.4 and 9.4.2.11] in place. Returns how many
@@ -80,7 +80,8 @@ struct Reassembly {
 /// what a stranger puts there. With Protection::Messages nothing else passes but announcements of
 /// participants and messages of authentication.
 /// `window`: what the readers of this participant wait for; nullptr: numbers are not limited by it.
-/// `reassembly`: of messages of authentication; nullptr: their fragments are skipped.
+/// `reassembly`: of messages of authentication; nullptr: their fragments are skipped, and the whole
+/// ones remain where they are.
 [[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message,
                                          Protection protection = Protection::None,
                                          const SequenceWindow* window = nullptr,

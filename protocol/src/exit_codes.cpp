@@ -41,6 +41,8 @@ std::string_view meaning_of(ExitCode code) noexcept {
       return "the stop of the measuring machine is not confirmed: it may be moving";
     case ExitCode::StopNotSent:
       return "no stop could be sent to the measuring machine: it may be moving";
+    case ExitCode::Worse:
+      return "worse with the model than without it: do not use the model";
     case ExitCode::Internal:
       return "internal error";
     case ExitCode::Interrupted:

@@ -181,6 +181,72 @@ TEST(Verification, SeesNoEffectInNoise) {
   EXPECT_EQ(effect_at_points(c), Effect::NotSeen);
 }
 
+/// Errors that all shots of a place share (20 um, drawn for each place), and noise of each shot (1 um).
+std::vector<MeasuredPoint> shots_at(const std::vector<Vector3>& places,
+                                    const std::vector<int>& shots, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 1e-6);
+  const auto vector = [&] {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Vector3(x, y, z);
+  };
+  std::vector<Vector3> common;
+  for (std::size_t i = 0; i < places.size(); ++i) common.push_back(20.0 * vector());
+  std::vector<MeasuredPoint> points;
+  const RigidTransform T = tracker_station();
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (int k = 0; k < shots[i]; ++k)
+      points.push_back({places[i] + 2.0 * vector(), T * (places[i] + common[i] + vector())});
+  return points;
+}
+
+TEST(Verification, CountsManyShotsOfOnePlaceAsOnePlace) {
+  const auto places = box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {3, 3, 3});
+  std::vector<int> once(places.size(), 1), often = once;
+  often[4] = 400;
+  const auto model = scaled_tables(1e-6);
+  const auto left_um = [&](const std::vector<int>& shots) {
+    const auto o = *observe(shots_at(places, shots, 3));
+    EXPECT_EQ(o.shots.size(), places.size());
+    return 1e6 * compare_at_points(o, model, Vector3::Zero())->after.rms_m;
+  };
+  EXPECT_NEAR(left_um(often), left_um(once), 3.0);  // 400 points of 426 would leave 7 um of 31
+  EXPECT_GT(left_um(once), 25.0);
+}
+
+TEST(Verification, GivesTheScatterOfTheShots) {
+  const auto places = box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {3, 3, 3});
+  const auto o = *observe(shots_at(places, std::vector<int>(places.size(), 20), 3));
+  EXPECT_EQ(o.shot_count(), 540u);
+  ASSERT_TRUE(o.repeatability_m);
+  // a vector of three components of 1 um, and readings of 2 um: sqrt(3 (1 + 4)), 0.03 um of chance
+  EXPECT_NEAR(1e6 * *o.repeatability_m, std::sqrt(15.0), 0.3);
+  EXPECT_FALSE(observe(shots_at(places, std::vector<int>(places.size(), 1), 3))->repeatability_m);
+}
+
+// A model of 1 um beside errors of 20 um changes the mean square by 1 um^2 only, and the places
+// scatter by 40 um^2: they show no effect, however often each was measured.
+TEST(Verification, IsNotSurerWithManyShotsOfFewPlaces) {
+  const auto places = box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {2, 2, 2});
+  int seen = 0;
+  constexpr int kRuns = 40;
+  for (unsigned seed = 0; seed < kRuns; ++seed) {
+    const auto o = *observe(shots_at(places, std::vector<int>(places.size(), 50), seed));
+    const auto c = *compare_at_points(o, scaled_tables(0.02), Vector3::Zero());
+    seen += effect_at_points(c) == Effect::NotSeen ? 0 : 1;
+  }
+  EXPECT_LE(seen, kRuns / 5);
+}
+
+TEST(Verification, DoesNotJoinPointsAtSmallDistances) {
+  auto readings = box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {2, 2, 2});
+  for (int i = 1; i <= 10; ++i) readings.emplace_back(0.6e-3 * i, 0.0, 0.0);
+  const auto o = *observe(measured(field_of(scaled_tables(1.0)), readings));
+  EXPECT_EQ(o.shots.size(), 8u + 5u);  // 1.2 mm from place to place
+  const auto small = box_of({0, 0, 0}, {4e-3, 4e-3, 4e-3}, {5, 5, 5});
+  EXPECT_EQ(observe(measured(field_of(scaled_tables(0.1)), small))->shots.size(), 125u);
+}
+
 TEST(Verification, SeesTheRotationOnlyInTheMachinesAxes) {
   const auto model = reference_model("true");
   const Vector3 omega(2e-4, -3e-4, 5e-4), ball1(-0.09, 0.14, 0.03);

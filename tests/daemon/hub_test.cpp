@@ -322,8 +322,10 @@ TEST_F(HubTest, CollectsStandstillsRequestedOverTheSocket) {
     }
   };
 
+  config_.machine.name = "small mill";
   const auto begun = ask({{"do", "verification"}, {"step", "begin"}});
   ASSERT_EQ(begun["ok"], true) << begun.dump();
+  EXPECT_EQ(begun["machine"], "small mill");
   stand(0.1);
   stand(0.2);
   const auto look =

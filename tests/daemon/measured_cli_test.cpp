@@ -118,6 +118,7 @@ TEST_F(MeasuredCli, NamesTheLineOfAValueThatAloneDoesNotFit) {
   all[200].value = 1e30;
   write_rows(all);
   const auto ran = compare();
+  EXPECT_EQ(ran.exit, 1);  // EBX agrees
   EXPECT_THAT(ran.out, AllOf(HasSubstr("measured.csv:9: EXX alone does not fit"),
                              HasSubstr("measured.csv:202: EYX alone does not fit")));
   const auto object = nlohmann::json::parse(compare("--json").out);
@@ -190,8 +191,10 @@ TEST_F(MeasuredCli, IgnoresAnOffsetOfTheValues) {
 
 TEST_F(MeasuredCli, DoesNotTestOneRun) {
   const auto ran = compare_changed([](MeasuredRow&) {}, 1);
-  EXPECT_EQ(ran.exit, 0);
-  EXPECT_THAT(ran.out, AllOf(HasSubstr("not tested"), HasSubstr("one run shows no scatter")));
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("not tested"), HasSubstr("one run shows no scatter"),
+                             HasSubstr("no table was tested")));
+  EXPECT_EQ(nlohmann::json::parse(compare("--json").out)["tables_tested"], 0);
   EXPECT_THAT(compare("--u-um 1 --u-urad 1").out,
               AllOf(HasSubstr("agrees"), Not(HasSubstr("not tested"))));
 }

@@ -173,7 +173,7 @@ TEST_F(VerifyCli, ComparesSeveralModelsAtTheSamePoints) {
   write("points.csv", to_verification_csv(points));
 
   const auto ran = abbe("verify good.json other.json --points points.csv --json");
-  ASSERT_EQ(ran.exit, 0) << ran.err;
+  ASSERT_EQ(ran.exit, 8) << ran.err;
   const auto object = nlohmann::json::parse(ran.out);
   EXPECT_EQ(object["points"], 65);
   EXPECT_EQ(object["inside_all"], 64);
@@ -181,7 +181,7 @@ TEST_F(VerifyCli, ComparesSeveralModelsAtTheSamePoints) {
   EXPECT_EQ(object["models"][0]["effect"], "better");
   EXPECT_EQ(object["models"][1]["effect"], "worse");
   EXPECT_THAT(abbe("verify good.json other.json --points points.csv").out,
-              AllOf(HasSubstr("at 64 of 65 points"), HasSubstr("without a model"),
+              AllOf(HasSubstr("at 64 of 65 places"), HasSubstr("without a model"),
                     HasSubstr("other.json")));
   for (const char* option : {"-o out", "--grid-mm 1,1,1", "--origin-mm 0,0,0", "--planes-mm 0,0,0",
                              "--least-distance-mm 1"}) {
@@ -222,10 +222,51 @@ TEST_F(VerifyCli, ReportsFirstThatABadModelIncreasesTheError) {
   write("tables.json", to_json(document));
   write("points.csv", points_of_tables(document, -1.0));
   const auto ran = abbe("verify tables.json --points points.csv -o out");
-  ASSERT_EQ(ran.exit, 0) << ran.err;
+  ASSERT_EQ(ran.exit, 8) << ran.err;
   EXPECT_THAT(ran.out, StartsWith("verdict     WORSE with the model: do not use it"));
   const auto page = text_of(folder_ / "out/report.html");
-  EXPECT_LT(page.find("WORSE with the model"), page.find("Residuals at the measured points"));
+  EXPECT_LT(page.find("WORSE with the model"), page.find("Residuals at the measured places"));
+}
+
+TEST_F(VerifyCli, StatesShotsAndPlaces) {
+  const auto document = test::synthetic_document(3);
+  write("tables.json", to_json(document));
+  auto points = points_of(document);
+  for (int i = 0; i < 5; ++i) {
+    points.push_back(points[7]);
+    points.back().measured_m.x() += 1e-6 * i;
+  }
+  write("shots.csv", to_verification_csv(points));
+  const auto ran = abbe("verify tables.json --points shots.csv -o out");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out,
+              HasSubstr("points      348 shots at 343 places, 1 to 6 each, which scatter"));
+  EXPECT_THAT(text_of(folder_ / "out/report.html"),
+              AllOf(HasSubstr("348 shots at 343 places"), HasSubstr("(6 shots)")));
+  const auto object =
+      nlohmann::json::parse(abbe("verify tables.json --points shots.csv --json").out);
+  EXPECT_EQ(object["points"], 348);
+  EXPECT_EQ(object["places"], 343);
+  EXPECT_GT(object["repeatability_um"].get<double>(), 0.5);
+}
+
+TEST_F(VerifyCli, RefusesModelsOfDifferentMachines) {
+  auto document = test::synthetic_document(3);
+  write("a.json", to_json(document));
+  write("points.csv", to_verification_csv(points_of(document)));
+  document.machine = "another mill";
+  write("b.json", to_json(document));
+  for (const std::string command : {"verify a.json b.json --points points.csv",
+                                    "model compare a.json b.json", "model drift a.json b.json"}) {
+    const auto refused = abbe(command);
+    EXPECT_EQ(refused.exit, 2) << command;
+    EXPECT_THAT(refused.err,
+                AllOf(HasSubstr("b.json of \"another mill\""), HasSubstr("--other-machine")));
+    const auto meant = abbe(command + " --other-machine");
+    EXPECT_EQ(meant.exit, 0) << meant.err;
+    EXPECT_THAT(meant.out, HasSubstr("different machines: a.json is of machine")) << command;
+    EXPECT_THAT(abbe(command + " --other-machine --json").out, HasSubstr("another mill"));
+  }
 }
 
 std::string watched_portal() {
@@ -283,6 +324,15 @@ TEST_F(VerifyCli, TakesTheStandstillsOfARecording) {
   }
 }
 
+TEST_F(VerifyCli, RefusesARecordingOfAnotherMachine) {
+  record_standstills(folder_, tracker_points(study::table3_machine()));
+  const auto document = test::synthetic_document(3);
+  write("tables.json", to_json(document));
+  const auto refused = abbe("verify tables.json --recording run.mcap");
+  EXPECT_EQ(refused.exit, 2);
+  EXPECT_THAT(refused.err, HasSubstr("run.mcap of \"weak portal\""));
+}
+
 TEST_F(VerifyCli, ADamagedRecordingShowsItsResultAndEndsWithOne) {
   const auto points = tracker_points(study::table3_machine());
   record_standstills(folder_, points);
@@ -303,7 +353,8 @@ std::unique_ptr<ControlServer> daemon_with(
   return std::move(*ControlServer::open(socket, [points](const nlohmann::json& request,
                                                          const ControlPeer&) {
     const auto list = [](const calib::Vector3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
-    if (request.at("step") == "begin") return nlohmann::json{{"ok", true}, {"number", 7}};
+    if (request.at("step") == "begin")
+      return nlohmann::json{{"ok", true}, {"number", 7}, {"machine", "weak portal"}};
     EXPECT_EQ(request.at("number"), 7);
     const auto from = request.at("from").get<std::size_t>();
     nlohmann::json found = nlohmann::json::array();
@@ -325,6 +376,16 @@ TEST_F(VerifyCli, CollectsThePointsOfTheRunningDaemon) {
   EXPECT_THAT(ran.err, HasSubstr(fmt::format("{}: ", points.size())));
   EXPECT_EQ(nlohmann::json::parse(ran.out)["points"], points.size());
   EXPECT_EQ(text_of(folder_ / "out/verification.csv"), text_of(folder_ / "verification.csv"));
+}
+
+TEST_F(VerifyCli, CollectsNoPointsOfAnotherMachine) {
+  const auto points = tracker_points(study::table3_machine());
+  const auto server = daemon_with(folder_ / "control.sock", points);
+  write("tables.json", to_json(test::synthetic_document(3)));
+  const auto ran = abbe("verify tables.json --live --socket control.sock --count 5 -o out");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, HasSubstr("the daemon of \"weak portal\""));
+  EXPECT_FALSE(fs::exists(folder_ / "out/verification.csv"));
 }
 
 TEST_F(VerifyCli, KeepsCollectedPointsThatAllowNoResult) {

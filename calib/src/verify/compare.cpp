@@ -340,7 +340,7 @@ Result<Comparison> compare_at_points(const Observations& o, const VolumetricMode
     return failure(
         ErrorCode::TooFewObservations,
         message("verification: ", out.inside.size(), " of ", o.readings_m.size(),
-                " measured points are inside the model's validity volume, needs ", kLeastPoints));
+                " measured places are inside the model's validity volume, needs ", kLeastPoints));
   }
 
   auto before = left_after_fit(measured, readings), after = left_after_fit(measured, corrected);

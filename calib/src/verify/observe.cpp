@@ -1,6 +1,7 @@
 #include "abbe/calib/verify/observe.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "abbe/calib/axis_mistakes.hpp"
 #include "abbe/calib/model_comparison.hpp"
@@ -90,7 +91,75 @@ Result<void> check_lack_of_fit(const Observations& o, const Extent& extent) {
   return {};
 }
 
+/// Distance of the readings up to which two shots are of one place.
+double same_place_m(std::span<const MeasuredPoint> points) {
+  Vector3 low = points.empty() ? Vector3::Zero() : points.front().reading_m, high = low;
+  for (const MeasuredPoint& p : points) {
+    low = low.cwiseMin(p.reading_m);
+    high = high.cwiseMax(p.reading_m);
+  }
+  return std::min(kSamePlace_m, kSamePlaceOfExtent * (high - low).norm());
+}
+
+/// The shots of each place, in the order of the first shots. A shot belongs to the first place whose
+/// first shot is near enough: a row of points at small distances does not become one place.
+std::vector<std::vector<std::size_t>> shots_of_places(std::span<const MeasuredPoint> points,
+                                                      double same_place_m) {
+  std::vector<std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto place =
+        std::find_if(places.begin(), places.end(), [&](const std::vector<std::size_t>& shots) {
+          return (points[shots.front()].reading_m - points[i].reading_m).norm() <= same_place_m;
+        });
+    if (place == places.end()) {
+      places.push_back({i});
+    } else {
+      place->push_back(i);
+    }
+  }
+  return places;
+}
+
+/// The mean of the shots.
+MeasuredPoint mean_of_place(std::span<const MeasuredPoint> points,
+                            const std::vector<std::size_t>& shots) {
+  // Relative to the first shot: the mean of a single shot is the shot, bit by bit.
+  MeasuredPoint mean = points[shots.front()];
+  Vector3 reading = Vector3::Zero(), measured = Vector3::Zero();
+  for (const std::size_t shot : shots) {
+    reading += points[shot].reading_m - mean.reading_m;
+    measured += points[shot].measured_m - mean.measured_m;
+  }
+  mean.reading_m += reading / static_cast<double>(shots.size());
+  mean.measured_m += measured / static_cast<double>(shots.size());
+  return mean;
+}
+
+/// See Observations::repeatability_m.
+std::optional<double> repeatability_m(std::span<const MeasuredPoint> points,
+                                      const Observations& o) {
+  if (points.size() == o.shots.size()) {
+    return std::nullopt;
+  }
+  double squares = 0.0;
+  for (std::size_t place = 0; place < o.shots.size(); ++place) {
+    for (const std::size_t shot : o.shots[place]) {
+      const Vector3 V = o.T_machine_tracker * points[shot].measured_m - points[shot].reading_m;
+      squares += (V - o.V_m[place]).squaredNorm();
+    }
+  }
+  return std::sqrt(squares / static_cast<double>(points.size() - o.shots.size()));
+}
+
 }  // namespace
+
+std::size_t Observations::shot_count() const noexcept {
+  std::size_t count = 0;
+  for (const auto& of_place : shots) {
+    count += of_place.size();
+  }
+  return count;
+}
 
 Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame) {
   if (auto finite = check_finite(points); !finite) {
@@ -99,9 +168,11 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
 
   Observations o;
   o.frame = frame;
-  for (const MeasuredPoint& p : points) {
-    o.readings_m.push_back(p.reading_m);
-    o.measured_m.push_back(p.measured_m);
+  o.shots = shots_of_places(points, same_place_m(points));
+  for (const auto& shots : o.shots) {
+    const MeasuredPoint mean = mean_of_place(points, shots);
+    o.readings_m.push_back(mean.reading_m);
+    o.measured_m.push_back(mean.measured_m);
   }
 
   const auto extent = extent_of(o.readings_m);
@@ -117,9 +188,10 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
     o.T_machine_tracker = *T;
   }
 
-  for (const MeasuredPoint& p : points) {
-    o.V_m.emplace_back(o.T_machine_tracker * p.measured_m - p.reading_m);
+  for (std::size_t place = 0; place < o.shots.size(); ++place) {
+    o.V_m.emplace_back(o.T_machine_tracker * o.measured_m[place] - o.readings_m[place]);
   }
+  o.repeatability_m = repeatability_m(points, o);
 
   if (auto fits = check_lack_of_fit(o, *extent); !fits) {
     return tl::make_unexpected(fits.error());

@@ -79,6 +79,10 @@ bool any_with(const MeasuredComparison& found, direct::Finding finding) {
                              [&](const auto& table) { return table.finding == finding; });
 }
 
+bool is_tested(const direct::TableComparison& table) {
+  return table.finding == direct::Finding::Agrees || table.finding == direct::Finding::Contradicts;
+}
+
 const char* unit_of(const direct::TableComparison& table) {
   return table.is_angle ? "urad" : "um";
 }
@@ -158,6 +162,7 @@ void print_measured_json(const MeasuredComparison& found, const MeasuredOptions&
       {"tool_mm",
        {kMmPerM * found.tool_m.x(), kMmPerM * found.tool_m.y(), kMmPerM * found.tool_m.z()}},
       {"rows_off", found.rows_off},
+      {"tables_tested", std::ranges::count_if(found.tables, is_tested)},
       {"tables", json::array()},
       {"volume", volume_json(found.volume)}};
   for (const auto& table : found.tables) object["tables"].push_back(table_json(table));
@@ -252,6 +257,8 @@ void print_measured_text(const MeasuredComparison& found) {
   fmt::print("\n");
   for (const auto& table : found.tables) print_remarks(table);
   for (const auto& line : found.rows_off) fmt::print("{}\n", printable_line(line));
+  if (std::ranges::none_of(found.tables, is_tested))
+    fmt::print("no table was tested: this comparison neither confirms nor contradicts the model\n");
 
   print_conventions(found);
   fmt::print(
@@ -274,8 +281,9 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
   auto* measured = command.add_option(
       "--measured", options.file,
       "measured.csv: error motions that a device measured directly; compare A with them, table by\n"
-      "table and in the volume. Exit code 0: no table contradicts; 5: one does; 1: none can be\n"
-      "compared. `abbe example measured.csv` shows the columns");
+      "table and in the volume. Exit code 0: at least one table agrees and none contradicts;\n"
+      "5: one contradicts; 1: none could be tested, or a single value does not fit the others.\n"
+      "`abbe example measured.csv` shows the columns");
   command
       .add_option("--straightness", options.straightness,
                   "line that is removed from straightness errors, of both")
@@ -299,9 +307,8 @@ Result<int> compare_with_measured(const calib::VolumetricModel& model,
   json ? print_measured_json(*found, options) : print_measured_text(*found);
 
   if (any_with(*found, direct::Finding::Contradicts)) return exit_code(ErrorCode::Refused);
-  const bool none =
-      std::ranges::all_of(found->tables, [](const auto& table) { return table.points.empty(); });
-  return none ? exit_code(ErrorCode::DataInsufficient) : 0;
+  const bool tested = any_with(*found, direct::Finding::Agrees);
+  return tested && found->rows_off.empty() ? 0 : exit_code(ErrorCode::DataInsufficient);
 }
 
 }  // namespace abbe::daemon

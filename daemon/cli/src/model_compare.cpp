@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +15,7 @@
 #include "direction_option.hpp"
 #include "figures.hpp"
 #include "measured_comparison.hpp"
+#include "same_machine.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 
@@ -24,13 +26,15 @@ struct ModelCompareArguments {
   std::string a, b, direction;
   MeasuredOptions measured;
   StoreOption store;
-  bool json = false;
+  bool other_machine = false, json = false;
 };
 
 struct Comparison {
   std::size_t points = 0;
   calib::ModelDifference difference;
   std::vector<std::string> cautions_a, cautions_b;
+  std::string machine_a, machine_b;
+  std::string different_machines;  ///< empty: they are the same
 };
 
 /// The points of comparison: those nodes of the two models that are in the validity volume of both.
@@ -50,6 +54,9 @@ Result<Comparison> compare(const ModelCompareArguments& arguments) {
   if (!found_a) return tl::make_unexpected(found_a.error());
   const auto found_b = found_model(arguments.b, arguments.store);
   if (!found_b) return tl::make_unexpected(found_b.error());
+  const std::array machines{of_machine(arguments.a, *found_a), of_machine(arguments.b, *found_b)};
+  auto different = require_same_machine("model compare", machines, arguments.other_machine);
+  if (!different) return tl::make_unexpected(different.error());
   const ModelDocument *const a = &found_a->document, *const b = &found_b->document;
 
   const auto travel = parse_direction(arguments.direction);
@@ -65,7 +72,9 @@ Result<Comparison> compare(const ModelCompareArguments& arguments) {
   if (!difference)
     return fail(ErrorCode::DataInsufficient,
                 fmt::format("{} and {}: {}", arguments.a, arguments.b, difference.error().text));
-  return Comparison{points.size(), *difference, cautions_of(*found_a), cautions_of(*found_b)};
+  return Comparison{points.size(),         *difference,         cautions_of(*found_a),
+                    cautions_of(*found_b), machines[0].machine, machines[1].machine,
+                    *std::move(different)};
 }
 
 void print(const char* what, const calib::VectorStatistics& s) {
@@ -91,12 +100,15 @@ int run(const ModelCompareArguments& arguments) {
     const nlohmann::json object{{"points", found->points},
                                 {"as_stated", vector_figures(d.as_stated)},
                                 {"rigid_free", vector_figures(d.rigid_free)},
+                                {"machine_a", found->machine_a},
+                                {"machine_b", found->machine_b},
                                 {"cautions_a", found->cautions_a},
                                 {"cautions_b", found->cautions_b}};
     fmt::print("{}\n", indented_json_text(object));
     return 0;
   }
 
+  if (!found->different_machines.empty()) fmt::print("{}\n", found->different_machines);
   for (const auto& caution : found->cautions_a) fmt::print("A: {}\n", printable_line(caution));
   for (const auto& caution : found->cautions_b) fmt::print("B: {}\n", printable_line(caution));
   fmt::print("|V(A) - V(B)| at {} nodes where both are valid, um\n", found->points);
@@ -115,7 +127,9 @@ void add_model_compare(CLI::App& parent, int& exit) {
       "compare",
       "Print the difference of two models at the nodes where both are valid, for the tool of A:\n"
       "as stated, and without the rigid motion of the whole volume, which no measurement can "
-      "determine.\nWith --measured FILE instead of B: the difference of directly measured error "
+      "determine.\nModels of different machines need "
+      "--other-machine.\nWith --measured FILE instead of B: the difference of directly measured "
+      "error "
       "motions and A.");
   command
       ->add_option("A", arguments->a,
@@ -131,6 +145,7 @@ void add_model_compare(CLI::App& parent, int& exit) {
       "direction in which X, Y and Z last moved, such as +,-,0 (0: not known); a "
       "model without backlash is the mean of both directions");
   measured->excludes(direction);  // measurements are the mean of both directions
+  add_other_machine_option(*command, arguments->other_machine);
   command->add_flag("--json", arguments->json, "print one JSON object");
   command->callback([arguments, &exit] {
     if (!arguments->measured.file.empty())

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -12,6 +13,7 @@
 #include "abbe/calib/model_drift.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "commands.hpp"
+#include "same_machine.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 
@@ -22,7 +24,7 @@ struct ModelDriftArguments {
   std::string a, b;
   StoreOption store;
   double false_alarm = calib::DriftOptions{}.false_alarm;
-  bool json = false;
+  bool other_machine = false, json = false;
 };
 
 constexpr double kMicroPerSi = 1e6;
@@ -79,16 +81,25 @@ void print(const calib::DriftTest& drift) {
 }
 
 int run_model_drift(const ModelDriftArguments& arguments) {
-  const auto a = model_named(arguments.a, arguments.store);
+  const auto a = found_model(arguments.a, arguments.store);
   if (!a) return report(a.error());
-  const auto b = model_named(arguments.b, arguments.store);
+  const auto b = found_model(arguments.b, arguments.store);
   if (!b) return report(b.error());
-  const auto drift = calib::test_drift(b->model, a->model, {.false_alarm = arguments.false_alarm});
+  const std::array machines{of_machine(arguments.a, *a), of_machine(arguments.b, *b)};
+  const auto different = require_same_machine("model drift", machines, arguments.other_machine);
+  if (!different) return report(different.error());
+
+  const auto drift = calib::test_drift(b->document.model, a->document.model,
+                                       {.false_alarm = arguments.false_alarm});
   if (!drift) return report(error_of(drift.error()));
 
   if (arguments.json) {
-    fmt::print("{}\n", indented_json_text(drift_json(*drift)));
+    auto object = drift_json(*drift);
+    object["machine_a"] = machines[0].machine;
+    object["machine_b"] = machines[1].machine;
+    fmt::print("{}\n", indented_json_text(object));
   } else {
+    if (!different->empty()) fmt::print("{}\n", *different);
     print(*drift);
   }
   return drift->drifted ? exit_code(ErrorCode::Refused) : 0;
@@ -101,7 +112,8 @@ void add_model_drift(CLI::App& parent, int& exit) {
   auto* command = parent.add_subcommand(
       "drift",
       "Test every table of model B against model A, with the uncertainty of both: has the machine\n"
-      "changed? For models of the same machine, nodes and tool. Prints the change of each table\n"
+      "changed? For models of the same nodes and tool; models of different machines need\n"
+      "--other-machine. Prints the change of each table\n"
       "where it is largest, if this table and those marked DRIFT are all that changed.\n"
       "Exit code 0: no table differs by more than its uncertainty; 5: one does; 1: the models\n"
       "cannot be compared table by table (`abbe model compare` can).");
@@ -116,6 +128,7 @@ void add_model_drift(CLI::App& parent, int& exit) {
       ->add_option("--false-alarm", arguments->false_alarm,
                    "probability of an alarm if nothing changed")
       ->capture_default_str();
+  add_other_machine_option(*command, arguments->other_machine);
   command->add_flag("--json", arguments->json, "print one JSON object");
   command->callback([arguments, &exit] { exit = run_model_drift(*arguments); });
 }

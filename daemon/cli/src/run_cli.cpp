@@ -41,6 +41,7 @@ std::string footer() {
                "refused by the gate, or because of the state of the daemon or of the model store"},
               {ExitCode::StopNotConfirmed},
               {ExitCode::StopNotSent},
+              {ExitCode::Worse},
               {ExitCode::Interrupted,
                "interrupted while following a calibration, which continues"}}) +
          "\nUnits: lengths mm, small errors um, angles rad or urad, times s; every column and key\n"

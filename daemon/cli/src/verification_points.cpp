@@ -51,11 +51,12 @@ Result<std::string> poll_points(const std::filesystem::path& socket, const json&
 
 /// The result after an error: the points collected so far, with the error as `cut_short`; if there
 /// are no points, the error.
-Result<LivePoints> points_so_far(VerificationFile& points, const Error& error) {
+Result<LivePoints> points_so_far(VerificationFile& points, const std::string& machine,
+                                 const Error& error) {
   if (points.points.empty()) return tl::make_unexpected(error);
   Error cut_short{ErrorCode::Io,
                   fmt::format("after {} points: {}", points.points.size(), error.text)};
-  return LivePoints{std::move(points), std::move(cut_short)};
+  return LivePoints{std::move(points), std::move(cut_short), machine};
 }
 
 }  // namespace
@@ -76,7 +77,7 @@ Result<LivePoints> points_of_recording(const std::string& file) {
   if (!replayed) return tl::make_unexpected(replayed.error());
   standstills.finish();
 
-  LivePoints out{{recording->source, {}, {}}, {}};
+  LivePoints out{{recording->source, {}, {}}, {}, config.machine.name};
   for (const auto& p : standstills.points()) out.file.points.push_back(p.mean);
   if (const auto damage = recording->reader.damage(); !damage.empty())
     out.cut_short = Error{ErrorCode::DataInsufficient, fmt::format("{}: {}", file, damage), {}};
@@ -85,28 +86,35 @@ Result<LivePoints> points_of_recording(const std::string& file) {
 }
 
 Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::size_t count,
-                                    const Keep& keep) {
+                                    const Keep& keep,
+                                    const std::function<Result<void>(const std::string&)>& accept) {
   const auto begun = ask_daemon(socket, {{"do", "verification"}, {"step", "begin"}});
   if (!begun) return tl::make_unexpected(begun.error());
   const json number = begun->at("number");
+  const auto machine = begun->value("machine", std::string{});
+  VerificationFile out;
+  if (auto accepted = accept(machine); !accepted) {
+    (void)poll_points(socket, number, "end", out, [](const auto&) { return Result<void>{}; });
+    return tl::make_unexpected(accepted.error());
+  }
+
   mark_interruptions({SIGINT, SIGTERM, SIGHUP});
   fmt::print(stderr,
              "abbe: keep the machine still for some seconds at every point; press Ctrl-C after the "
              "last one\n");
-  VerificationFile out;
   const auto all = [&] { return interrupted() || (count != 0 && out.points.size() >= count); };
 
   for (; !all(); std::this_thread::sleep_for(kPointPollPeriod)) {
     const auto stopped = poll_points(socket, number, "look", out, keep);
-    if (!stopped) return points_so_far(out, stopped.error());
+    if (!stopped) return points_so_far(out, machine, stopped.error());
     if (stopped->empty()) continue;
     fmt::print(stderr, "abbe: {}\n", *stopped);
     break;
   }
 
   if (const auto ended = poll_points(socket, number, "end", out, keep); !ended)
-    return points_so_far(out, ended.error());
-  return LivePoints{std::move(out), {}};
+    return points_so_far(out, machine, ended.error());
+  return LivePoints{std::move(out), {}, machine};
 }
 
 }  // namespace abbe::daemon

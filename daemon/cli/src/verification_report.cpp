@@ -46,7 +46,7 @@ const char* words(verify::Effect effect) {
   return "";
 }
 
-std::size_t points_improved(const verify::Comparison& c) {
+std::size_t places_improved(const verify::Comparison& c) {
   std::size_t improved = 0;
   for (std::size_t i = 0; i < c.inside.size(); ++i)
     improved += c.residual_after_m[i].norm() < c.residual_before_m[i].norm() ? 1 : 0;
@@ -61,12 +61,13 @@ void add_verdict(HtmlReport& page, const Verification& v) {
 
 void add_left(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
-  page.heading("Residuals at the measured points");
+  page.heading("Residuals at the measured places");
   if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
   page.paragraph(fmt::format(
-      "{} of {} measured points are in the volume where the model is valid. Each row is computed "
-      "after the rigid motion of the instrument that fits it best.",
-      c.inside.size(), v.observations.readings_m.size()));
+      "{}. {} of these places are in the volume where the model is valid. The shots of one place "
+      "count as one place, with their mean, because errors that they have in common do not average "
+      "out. Each row is computed after the rigid motion of the instrument that fits it best.",
+      shots_text(v.observations), c.inside.size()));
 
   const auto row = [](const char* what, const calib::VectorStatistics& s) {
     return std::vector<std::string>{what, um_text(s.mean_m), um_text(s.rms_m), um_text(s.max_m)};
@@ -74,13 +75,26 @@ void add_left(HtmlReport& page, const Verification& v) {
 
   page.table({"", "mean", "rms", "largest"},
              {row("without compensation", c.before), row("with the model", c.after)});
-  page.plot(Histogram{"residuals at the measured points",
+  page.plot(Histogram{"residuals at the measured places",
                       "um",
                       {{"without compensation", lengths_um(c.residual_before_m)},
                        {"with the model", lengths_um(c.residual_after_m)}}});
 }
 
-/// Adds a table of the points with the largest residuals, which shows a single wrong row of the
+/// "line 9", "lines 9, 12, 40 (3 shots)".
+std::string place_text(const Verification& v, std::size_t place) {
+  constexpr std::size_t kShown = 4;
+  const auto& shots = v.observations.shots[place];
+  std::string numbers;
+  for (std::size_t i = 0; i < std::min(kShown, shots.size()); ++i)
+    numbers +=
+        fmt::format("{}{}", i == 0 ? "" : ", ", v.lines.empty() ? shots[i] + 1 : v.lines[shots[i]]);
+  return fmt::format("{}{} {}{}", v.lines.empty() ? "point" : "line", shots.size() > 1 ? "s" : "",
+                     numbers,
+                     shots.size() > kShown ? fmt::format(" ... ({} shots)", shots.size()) : "");
+}
+
+/// Adds a table of the places with the largest residuals, which shows a single wrong row of the
 /// file, for example after the beam was interrupted.
 void add_farthest(HtmlReport& page, const Verification& v) {
   constexpr std::size_t kShown = 5;
@@ -96,10 +110,8 @@ void add_farthest(HtmlReport& page, const Verification& v) {
 
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < static_cast<std::size_t>(shown); ++i) {
-    const std::size_t point = c.inside[order[i]];
-    rows.push_back({v.lines.empty() ? fmt::format("point {}", point + 1)
-                                    : fmt::format("line {}", v.lines[point]),
-                    mm(v.observations.readings_m[point]),
+    const std::size_t place = c.inside[order[i]];
+    rows.push_back({place_text(v, place), mm(v.observations.readings_m[place]),
                     um_text(c.residual_after_m[order[i]].norm())});
   }
 
@@ -253,9 +265,20 @@ void add_planes(HtmlReport& page, const Verification& v) {
 }  // namespace
 
 std::string verdict_text(const verify::Comparison& c) {
-  return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} points improved",
+  return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} places improved",
                      words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m,
-                     kUmPerM * c.before.rms_m, points_improved(c), c.inside.size());
+                     kUmPerM * c.before.rms_m, places_improved(c), c.inside.size());
+}
+
+std::string shots_text(const verify::Observations& o) {
+  const std::size_t shots = o.shot_count(), places = o.shots.size();
+  if (!o.repeatability_m) return fmt::format("{} places, one shot each", places);
+  const auto [fewest, most] =
+      std::ranges::minmax(o.shots, {}, [](const auto& of_place) { return of_place.size(); });
+  return fmt::format(
+      "{} shots at {} places, {} to {} each, which scatter by {:.2f} um about the means of their "
+      "places",
+      shots, places, fewest.size(), most.size(), kUmPerM * *o.repeatability_m);
 }
 
 std::optional<std::string> why_no_ratio(const verify::Comparison& c) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
@@ -21,6 +23,7 @@
 #include "daemon_socket.hpp"
 #include "effect_name.hpp"
 #include "figures.hpp"
+#include "same_machine.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 #include "vector_option.hpp"
@@ -41,13 +44,14 @@ struct VerifyArguments {
   std::string tool, frame = "fit", origin, grid, planes;
   std::optional<double> least_distance_mm;
   StoreOption store;
-  bool json = false;
+  bool other_machine = false, json = false;
 };
 
 struct VerifyOutcome {
   ModelDocument document;
   Verification verification;
   std::vector<std::string> points_off{};  ///< points that alone do not fit, one line each
+  std::string machine;                    ///< of_machine() of the model
 };
 
 Result<verify::Options> options_of(const VerifyArguments& arguments) {
@@ -83,25 +87,45 @@ Result<void> keep(const VerifyArguments& arguments, const VerificationFile& poin
 
 Result<LivePoints> from_file(Result<VerificationFile> points) {
   if (!points) return tl::make_unexpected(points.error());
-  return LivePoints{std::move(*points), {}};
+  return LivePoints{std::move(*points), {}, {}};
 }
 
-Result<LivePoints> points_of(const VerifyArguments& arguments) {
-  if (!arguments.points.empty()) return from_file(read_verification_csv(arguments.points));
+/// What the points have in common with the models: where they come from, and their machine.
+OfMachine of_points(const VerifyArguments& arguments, const std::string& machine) {
+  return {arguments.live ? "the daemon" : printable_line(arguments.recording), machine};
+}
+
+/// The points for models of `machines`. They must be of the same machine, as far as it is known: a
+/// file of points does not state it. `different`: different_machines().
+Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMachine> machines,
+                             std::string& different) {
+  const auto accept = [&](const std::string& machine) -> Result<void> {
+    if (!machine.empty()) machines.push_back(of_points(arguments, machine));
+    auto found = require_same_machine("verify", machines, arguments.other_machine);
+    if (!found) return tl::make_unexpected(found.error());
+    different = *std::move(found);
+    return {};
+  };
+  if (!arguments.points.empty()) {
+    if (auto accepted = accept({}); !accepted) return tl::make_unexpected(accepted.error());
+    return from_file(read_verification_csv(arguments.points));
+  }
+
   const auto keep_them = [&arguments](const VerificationFile& points) {
     return keep(arguments, points);
   };
 
   if (!arguments.recording.empty()) {
     auto points = points_of_recording(arguments.recording);
-    if (points)
-      if (auto done = keep_them(points->file); !done) return tl::make_unexpected(done.error());
+    if (!points) return points;
+    if (auto done = keep_them(points->file); !done) return tl::make_unexpected(done.error());
+    if (auto done = accept(points->machine); !done) return tl::make_unexpected(done.error());
     return points;
   }
 
   const auto socket = socket_path({arguments.socket, arguments.store.config});
   if (!socket) return tl::make_unexpected(socket.error());
-  return points_of_daemon(*socket, arguments.count, keep_them);
+  return points_of_daemon(*socket, arguments.count, keep_them, accept);
 }
 
 /// The place of a point in messages: "points.csv:9", or "point 8" if it is not from a file.
@@ -145,20 +169,25 @@ Result<verify::Observations> observed_in(const VerifyArguments& arguments,
   return std::move(*observed);
 }
 
-/// The points inside the validity volume that alone do not fit the model.
+/// The shots at places inside the validity volume that alone do not fit the model.
 std::vector<std::string> off_with_model(const VerificationFile& file,
+                                        const verify::Observations& observed,
                                         const verify::Comparison& compared,
                                         const calib::VolumetricModel& model,
                                         const calib::Vector3& tool_m) {
   std::vector<calib::Vector3> measured_m, corrected_m;
-  for (const std::size_t point : compared.inside) {
-    const auto& [reading_m, at_m] = file.points[point];
+  std::vector<std::size_t> shots;
+  for (const std::size_t place : compared.inside)
+    shots.insert(shots.end(), observed.shots[place].begin(), observed.shots[place].end());
+  std::ranges::sort(shots);
+  for (const std::size_t shot : shots) {
+    const auto& [reading_m, at_m] = file.points[shot];
     measured_m.push_back(at_m);
     corrected_m.emplace_back(reading_m + model.V_at(reading_m, tool_m));
   }
   // An error of the size of those of the machine is one that the model does not know.
   auto off = calib::fit::points_off(measured_m, corrected_m, compared.before.rms_m);
-  for (auto& found : off.points) found.point = compared.inside[found.point];
+  for (auto& found : off.points) found.point = shots[found.point];
   return lines_of_points_off(
       file, off, "check or repeat this point; if it is right, the model is wrong there");
 }
@@ -182,7 +211,9 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
     v.planes_m = *planes;
   }
 
-  auto points = points_of(arguments);
+  const auto machine = of_machine(arguments.models.front(), *found);
+  std::string different;
+  auto points = points_of(arguments, {machine}, different);
   if (!points) return tl::make_unexpected(points.error());
   cut_short = std::move(points->cut_short);
 
@@ -192,7 +223,7 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   auto compared = verify::compare(*observed, document->model, *tool_m, *options);
   if (!compared) return tl::make_unexpected(error_of(compared.error()));
 
-  auto off = off_with_model(file, *compared, document->model, *tool_m);
+  auto off = off_with_model(file, *observed, *compared, document->model, *tool_m);
   v.observations = std::move(*observed);
   v.comparison = std::move(*compared);
   if (!file.source.name.empty()) v.inputs = {file.source};
@@ -200,7 +231,8 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   if (cut_short) v.cut_short = cut_short->text;
 
   v.cautions = cautions_of(*found);
-  return VerifyOutcome{std::move(*document), std::move(v), std::move(off)};
+  if (!different.empty()) v.cautions.push_back(std::move(different));
+  return VerifyOutcome{std::move(*document), std::move(v), std::move(off), machine.machine};
 }
 
 nlohmann::json figures(const verify::RatioStatistics& s) {
@@ -218,13 +250,18 @@ nlohmann::json figures(const verify::RatioStatistics& s) {
 
 void print_json(const VerifyOutcome& outcome) {
   const auto& c = outcome.verification.comparison;
+  const auto& o = outcome.verification.observations;
   const auto& turned = c.turned;
   nlohmann::json object{
       {"effect", effect_name(verify::effect_at_points(c))},
       {"model", model_id(outcome.document)},
       {"cautions", outcome.verification.cautions},
-      {"points", outcome.verification.observations.readings_m.size()},
+      {"machine", outcome.machine},
+      {"points", o.shot_count()},
+      {"places", o.shots.size()},
       {"inside", c.inside.size()},
+      {"repeatability_um",
+       o.repeatability_m ? nlohmann::json(kUmPerM * *o.repeatability_m) : nlohmann::json()},
       {"before", vector_figures(c.before)},
       {"after", vector_figures(c.after)},
       {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},
@@ -267,8 +304,8 @@ void print_summary(const VerifyOutcome& outcome, const VerifyArguments& argument
              printable_line(outcome.document.machine), outcome.document.method);
   for (const std::string& caution : v.cautions)
     fmt::print("caution     {}\n", printable_line(caution));
-  fmt::print("points      {}, {} of them where the model is valid\n",
-             v.observations.readings_m.size(), c.inside.size());
+  fmt::print("points      {}; {} of these places where the model is valid\n",
+             shots_text(v.observations), c.inside.size());
   fmt::print(
       "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with "
       "the model\n",
@@ -306,20 +343,25 @@ int run(const VerifyArguments& arguments) {
   if (const auto written = write_outputs(arguments.out, *outcome); !written)
     return report(written.error());
   arguments.json ? print_json(*outcome) : print_summary(*outcome, arguments);
-  return cut_short ? report(*cut_short) : 0;
+  if (cut_short) return report(*cut_short);
+  const auto effect = verify::effect_at_points(outcome->verification.comparison);
+  return number(effect == verify::Effect::Worse ? ExitCode::Worse : ExitCode::Done);
 }
 
 /// Several models at the same points.
 int run_several(const VerifyArguments& arguments) {
   const auto models = models_named(arguments.models, arguments.store, arguments.tool);
   if (!models) return report(models.error());
-  auto points = points_of(arguments);
+  std::vector<OfMachine> machines;
+  for (const NamedModel& model : *models) machines.push_back({model.name, model.machine});
+  SeveralOptions options{.json = arguments.json};
+  auto points = points_of(arguments, std::move(machines), options.different_machines);
   if (!points) return report(points.error());
   const auto observed = observed_in(arguments, points->file);
   if (!observed) return report(observed.error());
 
-  const auto done = verify_several(*models, *observed, arguments.json);
-  const int code = done ? 0 : report(done.error());
+  const auto done = verify_several(*models, *observed, options);
+  const int code = done ? *done : report(done.error());
   return points->cut_short ? report(*points->cut_short) : code;
 }
 
@@ -345,8 +387,9 @@ void add_options(CLI::App& command, VerifyArguments& arguments) {
   auto* points = command.add_option(
       "--points", arguments.points,
       "verification.csv: x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm: scale reading and\n"
-      "independent measurement of each point, each in its own frame; with [[thermal]] the\n"
-      "readings must be corrected for the temperature of the scales");
+      "independent measurement of each point, each in its own frame; rows with the same reading\n"
+      "(to 1 mm) are shots of one place; with [[thermal]] the readings must be corrected for the\n"
+      "temperature of the scales");
   auto* recording =
       command.add_option("--recording", arguments.recording,
                          "recording of the daemon (.mcap): one point per machine standstill");
@@ -382,6 +425,7 @@ void add_options(CLI::App& command, VerifyArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   command.add_option("--planes-mm", arguments.planes,
                      "x,y,z: planes of the vectors in the report; default: the middle of the grid");
+  add_other_machine_option(command, arguments.other_machine);
   command.add_flag("--json", arguments.json, "print the summary as one JSON object");
   command.add_option(
       "-o,--out", arguments.out,
@@ -398,8 +442,10 @@ void add_verify(CLI::App& parent, int& exit) {
       "Compare a model with independent measurements, for example of a laser tracker. Prints the\n"
       "verdict (better or worse with the model), the residuals with and without the model, and,\n"
       "if the points are dense enough to interpolate, R_resmag = |residual| / |measured error| on\n"
-      "a grid inside the model's volume. If the recording is damaged before its end, the result\n"
-      "is printed and the exit code is 1.");
+      "a grid inside the model's volume. Several shots of one place count as one place, with "
+      "their\n"
+      "mean. Exit code 8 if the errors are larger with the model (with one of several models). If\n"
+      "the recording is damaged before its end, the result is printed and the exit code is 1.");
   add_options(*command, *arguments);
 
   command->callback([arguments, &exit] {

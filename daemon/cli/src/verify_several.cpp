@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/verify/compare.hpp"
+#include "abbe/cli/verification_report.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "effect_name.hpp"
 #include "figures.hpp"
+#include "same_machine.hpp"
 #include "vector_option.hpp"
 
 namespace abbe::daemon {
@@ -19,10 +22,13 @@ namespace {
 
 namespace verify = calib::verify;
 
-/// The points at which all models are valid: the models are compared at the same points.
+/// The places at which all models are valid: the models are compared at the same places.
 verify::Observations inside_all(const verify::Observations& all,
                                 const std::vector<NamedModel>& models) {
-  verify::Observations common{.frame = all.frame, .T_machine_tracker = all.T_machine_tracker};
+  verify::Observations common;
+  common.frame = all.frame;
+  common.T_machine_tracker = all.T_machine_tracker;
+  common.repeatability_m = all.repeatability_m;
   for (std::size_t i = 0; i < all.readings_m.size(); ++i) {
     const bool inside = std::ranges::all_of(models, [&](const NamedModel& model) {
       return model.document.model.validity().contains(all.readings_m[i]);
@@ -31,6 +37,7 @@ verify::Observations inside_all(const verify::Observations& all,
     common.readings_m.push_back(all.readings_m[i]);
     common.measured_m.push_back(all.measured_m[i]);
     common.V_m.push_back(all.V_m[i]);
+    common.shots.push_back(all.shots[i]);
   }
   return common;
 }
@@ -54,13 +61,16 @@ Result<std::vector<Predicted>> predictions(const std::vector<NamedModel>& models
   return all;
 }
 
-void print_predictions_json(const std::vector<Predicted>& all, std::size_t points,
-                            std::size_t compared) {
-  nlohmann::json object{
-      {"points", points}, {"inside_all", compared}, {"models", nlohmann::json::array()}};
+void print_predictions_json(const std::vector<Predicted>& all, const verify::Observations& observed,
+                            const verify::Observations& common) {
+  nlohmann::json object{{"points", observed.shot_count()},
+                        {"places", observed.shots.size()},
+                        {"inside_all", common.shots.size()},
+                        {"models", nlohmann::json::array()}};
   for (const auto& [model, at_points] : all)
     object["models"].push_back({{"name", model->name},
                                 {"model", model_id(model->document)},
+                                {"machine", model->machine},
                                 {"cautions", model->cautions},
                                 {"effect", effect_name(verify::effect_at_points(at_points))},
                                 {"before", vector_figures(at_points.before)},
@@ -74,10 +84,11 @@ void print_prediction(const std::string& name, const char* effect,
              kUmPerM * s.rms_m, kUmPerM * s.max_m, effect);
 }
 
-void print_predictions(const std::vector<Predicted>& all, std::size_t points,
-                       std::size_t compared) {
-  fmt::print("residual errors at {} of {} points, where all models are valid, um\n", compared,
-             points);
+void print_predictions(const std::vector<Predicted>& all, const verify::Observations& observed,
+                       const verify::Observations& common) {
+  fmt::print("residual errors at {} of {} places, where all models are valid, um\n",
+             common.shots.size(), observed.shots.size());
+  if (observed.repeatability_m) fmt::print("{}\n", shots_text(observed));
   fmt::print("{:<32}  {:>9}  {:>9}  {:>9}  {}\n", "model", "mean", "rms", "largest", "effect");
   print_prediction("without a model", "", all.front().at_points.before);
   for (const auto& [model, at_points] : all)
@@ -99,7 +110,9 @@ Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& nam
     const auto tool_m = tool_of(tool, found->document.model);
     if (!tool_m) return tl::make_unexpected(tool_m.error());
     auto cautions = cautions_of(*found);
-    models.push_back({name, std::move(found->document), std::move(cautions), *tool_m});
+    auto machine = of_machine(name, *found).machine;
+    models.push_back(
+        {name, std::move(found->document), std::move(cautions), *tool_m, std::move(machine)});
   }
 
   constexpr double kSameTool_m = 1e-6;
@@ -114,14 +127,21 @@ Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& nam
   return models;
 }
 
-Result<void> verify_several(const std::vector<NamedModel>& models,
-                            const verify::Observations& observed, bool json) {
+Result<int> verify_several(const std::vector<NamedModel>& models,
+                           const verify::Observations& observed, const SeveralOptions& options) {
   const verify::Observations common = inside_all(observed, models);
   const auto all = predictions(models, common);
   if (!all) return tl::make_unexpected(all.error());
-  const std::size_t points = observed.readings_m.size(), compared = common.readings_m.size();
-  json ? print_predictions_json(*all, points, compared) : print_predictions(*all, points, compared);
-  return {};
+  if (options.json) {
+    print_predictions_json(*all, observed, common);
+  } else {
+    if (!options.different_machines.empty()) fmt::print("{}\n", options.different_machines);
+    print_predictions(*all, observed, common);
+  }
+  const bool worse = std::ranges::any_of(*all, [](const Predicted& one) {
+    return verify::effect_at_points(one.at_points) == verify::Effect::Worse;
+  });
+  return number(worse ? ExitCode::Worse : ExitCode::Done);
 }
 
 }  // namespace abbe::daemon

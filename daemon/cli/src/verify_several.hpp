@@ -17,6 +17,13 @@ struct NamedModel {
   ModelDocument document;
   std::vector<std::string> cautions;  ///< cautions_of()
   calib::Vector3 tool_m = calib::Vector3::Zero();
+  std::string machine;  ///< of_machine()
+};
+
+/// What several models are compared at.
+struct SeveralOptions {
+  std::string different_machines;  ///< different_machines(); empty: all are of one machine
+  bool json = false;
 };
 
 /// Reads the models; `tool`: x,y,z in mm, or empty for the tool of each model. Errors of
@@ -26,9 +33,11 @@ struct NamedModel {
                                                            const StoreOption& store,
                                                            const std::string& tool);
 
-/// Prints one row per model: residual errors at those points that are inside the validity volume of
-/// all models, without and with the model. DataInsufficient: fewer than 4 such points.
-[[nodiscard]] Result<void> verify_several(const std::vector<NamedModel>& models,
-                                          const calib::verify::Observations& observed, bool json);
+/// Prints one row per model: residual errors at those places that are inside the validity volume of
+/// all models, without and with the model. Returns the exit code: Worse if the errors are larger with
+/// one of the models. DataInsufficient: fewer than 4 such places.
+[[nodiscard]] Result<int> verify_several(const std::vector<NamedModel>& models,
+                                         const calib::verify::Observations& observed,
+                                         const SeveralOptions& options);
 
 }  // namespace abbe::daemon

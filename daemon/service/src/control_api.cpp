@@ -270,7 +270,8 @@ json verification_json(const SeenPoints& seen) {
 
 Reply begin_verification(VerificationService& service) {
   const auto number = service.begin();
-  return number ? reply(json{{"ok", true}, {"number", *number}}) : reply(number.error());
+  return number ? reply(json{{"ok", true}, {"number", *number}, {"machine", service.machine()}})
+                : reply(number.error());
 }
 
 Reply look_at_verification(VerificationService& service, std::uint64_t number, std::size_t from,
@@ -286,7 +287,7 @@ Reply look_at_verification(VerificationService& service, std::uint64_t number, s
                             .stopped = service.stopped()}] { return verification_json(seen); };
 }
 
-/// {"step": "begin"} returns the number of the verification. {"step": "look" | "end", "number": ..,
+/// {"step": "begin"} returns the number of the verification and the name of the machine. {"step": "look" | "end", "number": ..,
 /// "from": k} returns the points from index k on; with "end", the present standstill becomes the
 /// last point first.
 Result<OnHub> verification(const HubParts& parts, const json& request) {

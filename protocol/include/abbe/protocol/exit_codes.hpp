@@ -17,6 +17,7 @@ enum class ExitCode : int {
   Refused = 5,
   StopNotConfirmed = 6,
   StopNotSent = 7,
+  Worse = 8,          ///< a model makes the errors of the machine larger
   Internal = 70,      ///< EX_SOFTWARE of sysexits.h: an internal error
   Interrupted = 130,  ///< 128 + SIGINT, as a shell reports it
 };

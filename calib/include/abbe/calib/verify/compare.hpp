@@ -56,8 +56,8 @@ struct Comparison {
   std::optional<Vector3> origin_m;
   Vector3 step_m = Vector3::Zero();
   double least_distance_m = 0.0;
-  /// Indices of the measured points inside the validity volume, and the residual errors at these
-  /// points without compensation (`before`) and with the model (`after`). From the errors before
+  /// Indices of the places (see Observations) inside the validity volume, and the residual errors at
+  /// these places without compensation (`before`) and with the model (`after`). From the errors before
   /// and from those after, the best-fit rigid motion of each is removed.
   std::vector<std::size_t> inside;
   std::vector<Vector3> residual_before_m, residual_after_m;
@@ -72,14 +72,14 @@ struct Comparison {
   RatioStatistics R_stated, R_turned;
 };
 
-/// Effect of the model on the residual errors at the measured points inside its validity volume.
+/// Effect of the model on the residual errors at the measured places inside its validity volume.
 /// NotSeen: the effect is not significant.
 enum class Effect { Better, NotSeen, Worse };
 
-/// Compares the mean over the points of |residual_before_m|^2 - |residual_after_m|^2 with three
-/// times the standard error of this mean (s / sqrt(n), [GUM] 4.2.3). NotSeen if the absolute value
-/// of the mean is smaller. The errors of neighbouring points are correlated, so that this standard
-/// error is an underestimate.
+/// Compares the mean over the places of |residual_before_m|^2 - |residual_after_m|^2 with three
+/// times the standard error of this mean (s / sqrt(n), [GUM] 4.2.3), n: number of places, however
+/// many shots they have. NotSeen if the absolute value of the mean is smaller. The errors of
+/// neighbouring places are correlated, so that this standard error is an underestimate.
 [[nodiscard]] Effect effect_at_points(const Comparison&) noexcept;
 
 /// Largest permitted interpolation error as a fraction of the residual rms at the measured points.
@@ -90,14 +90,14 @@ inline constexpr double kMostInterpolation = 1.0 / 3.0;
 /// compensation, or less than 1 nm.
 [[nodiscard]] bool ratios_hold(const Comparison&) noexcept;
 
-/// The comparison at the measured points alone: inside, residuals, before, after. Predicts reference
+/// The comparison at the measured places alone: inside, residuals, before, after. Predicts reference
 /// points ([Sanders 2023] section 2.2). NotApplicable: the model is not valid for the tool.
-/// TooFewObservations: fewer than 4 measured points inside the validity volume.
+/// TooFewObservations: fewer than 4 measured places inside the validity volume.
 [[nodiscard]] Result<Comparison> compare_at_points(const Observations&, const VolumetricModel&,
                                                    const Vector3& tool_offset_m);
 
 /// NotApplicable: the model is not valid for the tool. TooFewObservations: fewer than 4 measured
-/// points inside the validity volume, or fewer than 4 grid points inside both the validity volume
+/// places inside the validity volume, or fewer than 4 grid points inside both the validity volume
 /// and the hull of the measured points. DegenerateGeometry: the origin is outside the hull of the
 /// measured points, so that V at the origin is not known. BadInput: the step gives more than a
 /// million grid points.

@@ -4,8 +4,15 @@
 /// from scale readings and the points that the instrument measured there. The pose of the
 /// instrument is known only from these points: its frame is fitted to the readings, and this
 /// removes the best-fit rigid motion (six parameters) from V. V = actual - nominal at the scale
-/// reading. Lengths in m. Pure; allocates.
+/// reading.
+///
+/// Several points that were measured at one position of the axes (shots) are one place, with their
+/// means. What is common to the shots of a place (errors of the machine between the nodes of a
+/// model, the seat of the reflector, the air on that beam) does not average out, and a place with
+/// many shots has the same weight as one with a single shot. Lengths in m. Pure; allocates.
 
+#include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,21 +31,33 @@ struct MeasuredPoint {
 ///   rotation and the unknown constant vector between reflector and axis positions.
 enum class Frame { BestFit, Machine };
 
-/// In the order of the points.
+/// One entry per place, in the order of the first shots.
 struct Observations {
   Frame frame = Frame::BestFit;
   RigidTransform T_machine_tracker;
-  std::vector<Vector3> readings_m;
-  std::vector<Vector3> measured_m;  ///< as given, in the instrument's frame
-  std::vector<Vector3> V_m;         ///< T measured - reading
+  std::vector<Vector3> readings_m;              ///< means of the shots
+  std::vector<Vector3> measured_m;              ///< means, in the instrument's frame
+  std::vector<Vector3> V_m;                     ///< T measured - reading
+  std::vector<std::vector<std::size_t>> shots;  ///< indices of the measured points of each place
+  /// Standard deviation of a shot from the mean of its place (length of the vector), pooled over the
+  /// places. nullopt: every place has one shot.
+  std::optional<double> repeatability_m{};
+
+  [[nodiscard]] std::size_t shot_count() const noexcept;
 };
+
+/// Largest distance of the scale readings of a shot from those of the first shot of its place, and
+/// its limit as a fraction of the extent of the points, for small machines. An axis returns to its
+/// target within some um; one that is driven by hand, within some tenths of a millimetre.
+inline constexpr double kSamePlace_m = 1e-3;
+inline constexpr double kSamePlaceOfExtent = 1.0 / 500.0;
 
 /// Largest permitted rms residual after the rigid fit, as a fraction of the extent of the points.
 /// Errors of machines are smaller. Exchanged rows, coordinates in inches or a left-handed frame
 /// give larger residuals.
 inline constexpr double kMostLackOfFit = 0.01;
 
-/// Errors: NotFinite; TooFewObservations for fewer than 4 points; DegenerateGeometry if the points
+/// Errors: NotFinite; TooFewObservations for fewer than 4 places; DegenerateGeometry if the places
 /// do not span a volume; AlignmentFailed if the residuals exceed kMostLackOfFit (with
 /// Frame::Machine after subtraction of their mean).
 [[nodiscard]] Result<Observations> observe(std::span<const MeasuredPoint>, Frame = Frame::BestFit);

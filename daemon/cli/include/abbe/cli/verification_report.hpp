@@ -17,7 +17,7 @@ struct Verification {
   calib::verify::Observations observations;
   calib::verify::Comparison comparison;
   std::vector<InputFile> inputs;
-  std::vector<std::size_t> lines;  ///< line numbers of the points in their file; may be empty
+  std::vector<std::size_t> lines;  ///< line numbers of the shots in their file; may be empty
   /// why some points are missing or may be wrong; empty: all are complete
   std::string cut_short{};
   /// What stands against the model, such as the verdict of a refused one.
@@ -28,8 +28,12 @@ struct Verification {
 };
 
 /// The verdict in one sentence, for example "better with the model: 0.090 um rms left, 41.300 um
-/// without it; 340 of 343 points improved".
+/// without it; 340 of 343 places improved".
 [[nodiscard]] std::string verdict_text(const calib::verify::Comparison&);
+
+/// How many shots there are, and their repeatability: "348 shots at 343 places, 1 to 6 each, which
+/// scatter by 1.20 um about the means of their places".
+[[nodiscard]] std::string shots_text(const calib::verify::Observations&);
 
 /// Why the report does not give R_resmag (residual / error without compensation); nullopt if it
 /// does.

@@ -31,6 +31,8 @@ class VerificationService {
   [[nodiscard]] Result<const StandstillPoints*> points(std::uint64_t number) const;
   /// Why no more points are taken although end() was not called; empty: points are taken.
   [[nodiscard]] std::string stopped() const;
+  /// The name of the machine in the configuration.
+  [[nodiscard]] const std::string& machine() const noexcept { return config_.machine.name; }
 
   void cycle(std::span<const protocol::Snapshot> snapshots);
 

@@ -107,6 +107,38 @@ TEST(SynchronisedEstimate, FindsTheClock) {
   }
 }
 
+/// Times since 1970, of either clock or of both, are the same times: but for steps of 0.24 us, which
+/// are 0.1 um of travel in one reading.
+TEST(SynchronisedEstimate, TakesTimesSince1970) {
+  constexpr double kSince1970_s = 1.7e9;
+  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+    EncoderRun run = make_encoder_run({});
+    run.run.options.estimator = estimator;
+    const auto wanted = identify_with_readings(run);
+    ASSERT_TRUE(wanted) << wanted.error().text;
+    for (const bool tracker_too : {false, true}) {
+      EncoderRun later = run;
+      for (EncoderReading& r : later.log.readings) {
+        r.time_s += kSince1970_s;
+      }
+      for (TrackerObservation& s : later.run.samples) {
+        s.time_s += tracker_too ? kSince1970_s : 0.0;
+      }
+      const auto id = identify_with_readings(later);
+      ASSERT_TRUE(id) << id.error().text;
+      ASSERT_TRUE(id->solution.synchronisation);
+      const Synchronisation &a = *wanted->solution.synchronisation,
+                            &b = *id->solution.synchronisation;
+      EXPECT_EQ(a.rows, b.rows);
+      const double between_s = tracker_too ? 0.0 : kSince1970_s;
+      EXPECT_NEAR(b.clock.offset_s - between_s, a.clock.offset_s, 0.5 * a.u_offset_s);
+      const Eigen::VectorXd d = id->solution.model.U() - wanted->solution.model.U();
+      const Eigen::VectorXd u = wanted->solution.model.covariance().diagonal().cwiseSqrt();
+      EXPECT_LT((d.array().abs() - 0.05 * u.array()).maxCoeff(), 1e-12);
+    }
+  }
+}
+
 /// Eight runs of 31 combinations each: standard deviation of the mean 0.09.
 TEST(SynchronisedEstimate, StatesAnHonestUncertainty) {
   double of_tables = 0.0, of_clock = 0.0;

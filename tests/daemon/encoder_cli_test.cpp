@@ -86,6 +86,65 @@ TEST_F(EncoderCli, GivesTheResultOfTheLibrary) {
   EXPECT_LT((document->model.U() - found->solution.model.U()).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+TEST_F(EncoderCli, TimesSince1970GiveTheSameModelAndClock) {
+  auto log = made_.log;
+  for (auto& r : log.readings) r.time_s += 1.7e9;
+  auto samples = made_.run.samples;
+  for (auto& s : samples) s.time_s += 1.7e9;
+  write("tracker.csv", test::made_tracker_csv(samples));
+  const auto ran = identify(log, "later", "--json");
+  write("tracker.csv", test::made_tracker_csv(made_.run.samples));
+  ASSERT_EQ(ran.exit, 0) << ran.out << ran.err;
+  const auto clocks = nlohmann::json::parse(ran.out).at("clocks"),
+             wanted = nlohmann::json::parse(synchronised_.out).at("clocks");
+  EXPECT_NEAR(clocks.at("offset_us").get<double>(), wanted.at("offset_us").get<double>(),
+              0.5 * wanted.at("u_offset_us").get<double>());
+  EXPECT_NEAR(clocks.at("at_tracker_time_s").get<double>() - 1.7e9,
+              wanted.at("at_tracker_time_s").get<double>(), 1e-6);
+  const auto a = read_model(folder_ / "out/model.json"),
+             b = read_model(folder_ / "later/model.json");
+  ASSERT_TRUE(a && b);
+  EXPECT_LT((a->model.U() - b->model.U()).cwiseAbs().maxCoeff(), 0.01e-6);
+}
+
+/// The drive is at 24000 mm/min.
+TEST_F(EncoderCli, NamesTimesThatAreNotInSeconds) {
+  auto log = made_.log;
+  for (auto& r : log.readings) r.time_s *= 1e3;
+  const auto scales = identify(log, "ms");
+  EXPECT_EQ(scales.exit, 3);
+  EXPECT_THAT(scales.err, AllOf(HasSubstr("encoder.csv:2: time_s: with the times of lines 2 to "),
+                                HasSubstr("expected 30 to 2e+05 mm/min"),
+                                HasSubstr("they fit as milliseconds")));
+}
+
+TEST_F(EncoderCli, ComparesTheTimesOfTheTrackerWithTheFeedOfThePath) {
+  const auto with_times = [&](double factor, const std::string& feed) {
+    auto samples = made_.run.samples;
+    for (auto& s : samples) s.time_s *= factor;
+    write("times.csv", test::made_tracker_csv(samples));
+    std::string text = "x_mm,y_mm,z_mm,feed_mm_per_min\n";
+    for (const auto& q : made_.run.path.vertices_m)
+      text +=
+          fmt::format("{:.17g},{:.17g},{:.17g},{}\n", 1e3 * q.x(), 1e3 * q.y(), 1e3 * q.z(), feed);
+    write("feed.csv", text);
+    return test::run_abbe(folder_,
+                          "identify otf --machine machine.toml --path feed.csv --tracker times.csv "
+                          "--accept-path-orientation -o feed");
+  };
+  EXPECT_EQ(with_times(1.0, "24000").exit, 0);
+  EXPECT_EQ(with_times(2.0, "24000").exit, 0) << "an override of 50 %";
+  EXPECT_EQ(with_times(1.0, "").exit, 0);
+  const auto slow = with_times(1e3, "24000");
+  EXPECT_EQ(slow.exit, 3);
+  EXPECT_THAT(slow.err, AllOf(HasSubstr("times.csv:2: time_s: with the times of lines 2 to "),
+                              HasSubstr("feed.csv states a feed_mm_per_min of 24000"),
+                              HasSubstr("expected 1200 to 4.8e+05 mm/min"),
+                              HasSubstr("they fit as milliseconds")));
+  EXPECT_THAT(with_times(1.0 / 60.0, "24000").err, HasSubstr("they fit as minutes"));
+  EXPECT_EQ(with_times(1e3, "").exit, 3);
+}
+
 /// A trigger line: 1 us are 0.4 um of travel.
 TEST_F(EncoderCli, ReadingsWithGoodTimesMakeTheModelMoreCertain) {
   const auto triggered = tests::otf::make_encoder_run({.seed = 3, .sigma_time_s = 1e-6});

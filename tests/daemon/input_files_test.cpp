@@ -137,6 +137,22 @@ TEST_F(InputFiles, ReadAnEncoderLog) {
   EXPECT_EQ(encoder->rows[1].reading_m, (AxisPosition{0.004, 0.005, 0.006}));
 }
 
+TEST_F(InputFiles, TimesAreSinceTheFirstRow) {
+  const auto tracker = read_tracker_csv(
+      write("t.csv", "time_s,x_mm,y_mm,z_mm\n# note\n1700000000.5,1,2,3\n1700000000.75,1,2,4\n"));
+  ASSERT_TRUE(tracker);
+  EXPECT_EQ(tracker->points[0].time_s, 0.0);
+  EXPECT_EQ(tracker->points[1].time_s, 0.25);
+  EXPECT_EQ(tracker->times.first_time_s, 1700000000.5);
+  EXPECT_EQ(tracker->times.first_line, 3u);
+  EXPECT_EQ(tracker->times.last_line, 4u);
+  const auto encoder =
+      read_encoder_csv(write("e.csv", "time_s,x_mm,y_mm,z_mm\n12.5,1,2,3\n12.75,4,5,6\n"));
+  ASSERT_TRUE(encoder);
+  EXPECT_EQ(encoder->rows[1].time_s, 0.25);
+  EXPECT_EQ(encoder->times.first_time_s, 12.5);
+}
+
 TEST_F(InputFiles, MayHaveADirectionOfTravelPerPoint) {
   using calib::estimation::AxisTravel;
   using calib::estimation::Travel;

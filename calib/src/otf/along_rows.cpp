@@ -80,14 +80,14 @@ double sample_variance_m2(const Vector3& direction, const Vector3& beam_m, const
 /// The readings at the time of every usable block.
 std::vector<std::optional<EncoderLine>> lines_of_blocks(const EncoderLines& lines,
                                                         const BlockSeries& series,
-                                                        const ClockMap& clock) {
+                                                        const RunClock& clock) {
   std::vector<std::optional<EncoderLine>> all(series.blocks.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Block& b = series.blocks[i];
     if (b.usable) {
-      all[i] =
-          lines.line(clock.machine_s(b.first_s - 0.5 * series.period_s), clock.machine_s(b.time_s),
-                     clock.machine_s(b.last_s + 0.5 * series.period_s));
+      all[i] = lines.line(clock.since_start_s(b.first_s - 0.5 * series.period_s),
+                          clock.since_start_s(b.time_s),
+                          clock.since_start_s(b.last_s + 0.5 * series.period_s));
     }
   }
   return all;
@@ -104,12 +104,12 @@ void append_copies(Observations& to, const Observations& across, std::size_t beg
 
 }  // namespace
 
-AlongRows::AlongRows(const EncoderLog& log, const ClockMap& clock)
+AlongRows::AlongRows(const EncoderLog& log, const RunClock& clock)
     : log_(&log), lines_(log.readings), clock_(clock) {}
 
 void AlongRows::correct_clock(const Eigen::VectorXd& by) {
   if (by.size() == static_cast<Eigen::Index>(kClockUnknowns)) {
-    clock_.offset_s += by(0);
+    clock_.lag_s += by(0);
     clock_.drift += by(1);
   }
 }

@@ -57,21 +57,21 @@ class SteppedLog {
   SteppedLog(const EncoderLines& lines, double wanted_step_s) {
     constexpr double kMostSteps = 1e6;  // of memory: 24 MB
     const std::span<const EncoderReading> readings = lines.readings();
-    first_s_ = readings.front().time_s;
-    const double span_s = readings.back().time_s - first_s_;
+    const double span_s = readings.back().time_s;
     step_s_ = std::max(wanted_step_s, span_s / kMostSteps);
     const auto steps = static_cast<std::size_t>(std::floor(span_s / step_s_)) + 1;
     q_m_.reserve(steps);
     for (std::size_t i = 0; i < steps; ++i) {
-      const double at_s = first_s_ + static_cast<double>(i) * step_s_;
+      const double at_s = static_cast<double>(i) * step_s_;
       const std::optional<EncoderLine> line = lines.line(at_s, at_s, at_s);
       q_m_.push_back(line ? line->q_m
                           : Vector3::Constant(std::numeric_limits<double>::quiet_NaN()));
     }
   }
 
-  /// The offset with the smallest sum of squared distances, each limited to kFar_m.
-  [[nodiscard]] double best_offset_s(std::span<const TimedPoint> points) const {
+  /// The time of the log at the first point for which the sum of squared distances, each limited to
+  /// kFar_m, is smallest.
+  [[nodiscard]] double best_start_s(std::span<const TimedPoint> points) const {
     std::vector<std::ptrdiff_t> step_of;
     const double start_s = points.front().time_s;
     for (const TimedPoint& p : points) {
@@ -87,7 +87,7 @@ class SteppedLog {
         best = shift;
       }
     }
-    return first_s_ + static_cast<double>(best) * step_s_ - start_s;
+    return static_cast<double>(best) * step_s_;
   }
 
  private:
@@ -108,7 +108,7 @@ class SteppedLog {
     return sum;
   }
 
-  double first_s_ = 0.0, step_s_ = 0.0;
+  double step_s_ = 0.0;
   std::vector<Vector3> q_m_;
 };
 
@@ -119,10 +119,10 @@ struct PointToLog {
   double late_s = 0.0;  ///< correction of the offset from this point
 };
 std::vector<PointToLog> compared(std::span<const TimedPoint> points, const EncoderLines& lines,
-                                 const ClockMap& clock) {
+                                 const RunClock& clock) {
   std::vector<PointToLog> all;
   for (const TimedPoint& p : points) {
-    const double at_s = clock.machine_s(p.time_s);
+    const double at_s = clock.since_start_s(p.time_s);
     if (const std::optional<EncoderLine> line = lines.line(at_s, at_s, at_s)) {
       const Vector3 difference = p.q_m - line->q_m;
       const double v_m_s = p.direction.dot(line->v_m_s);
@@ -135,7 +135,7 @@ std::vector<PointToLog> compared(std::span<const TimedPoint> points, const Encod
 
 /// Corrects the clock by the medians of the corrections of the first and the last half of the
 /// points; only points that are near.
-void correct(ClockMap& clock, std::span<const PointToLog> all) {
+void correct(RunClock& clock, std::span<const PointToLog> all) {
   std::vector<PointToLog> near;
   std::copy_if(all.begin(), all.end(), std::back_inserter(near),
                [](const PointToLog& p) { return p.distance_m < kFar_m; });
@@ -158,12 +158,12 @@ void correct(ClockMap& clock, std::span<const PointToLog> all) {
                late2_s = median_of(half, near.size(), &PointToLog::late_s);
   const double drift = (late2_s - late1_s) / (t2_s - t1_s);
   clock.drift += drift;
-  clock.offset_s += late1_s - drift * (t1_s - clock.reference_s);
+  clock.lag_s += late1_s - drift * (t1_s - clock.reference_s);
 }
 
 /// How well the readings fit with the best clock.
 struct ClockFit {
-  ClockMap clock;
+  RunClock clock;
   double median_m = std::numeric_limits<double>::infinity();
   double share_95_m = std::numeric_limits<double>::infinity();
   double covered = 0.0;
@@ -173,7 +173,7 @@ struct ClockFit {
   }
 };
 
-ClockFit fit_at(const ClockMap& clock, std::span<const TimedPoint> points,
+ClockFit fit_at(const RunClock& clock, std::span<const TimedPoint> points,
                 const EncoderLines& lines) {
   ClockFit fit{.clock = clock};
   std::vector<double> distances;
@@ -202,7 +202,10 @@ ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines,
   }
 
   const double step_s = kTravelPerStep_m / std::max(1e-4, median_speed_m_s(points));
-  ClockMap clock{SteppedLog(lines, step_s).best_offset_s(few), 0.0, reference_s};
+  RunClock clock{
+      .lag_s = SteppedLog(lines, step_s).best_start_s(few) - (few.front().time_s - reference_s),
+      .reference_s = reference_s,
+      .log_start_s = lines.log_start_s()};
   constexpr int kCorrections = 4;  // each leaves a tenth, then the errors of the machine
   for (int i = 0; i < kCorrections; ++i) {
     correct(clock, compared(points, lines, clock));
@@ -236,12 +239,15 @@ std::string mistakes_that_fit(std::span<const TimedPoint> points, const EncoderL
 
 }  // namespace
 
-Result<ClockMap> match_clocks(const EncoderLog& log, const Observations& across,
+Result<RunClock> match_clocks(const EncoderLog& log, const Observations& across,
                               const BlockSeries& series) {
   const std::vector<TimedPoint> points = timed_points(across, series);
   const EncoderLines lines(log.readings);
-  const ClockFit fit = log.known_clock ? fit_at(*log.known_clock, points, lines)
-                                       : best_fit(points, lines, series.first_time_s);
+  const double reference_s = series.first_time_s;
+  const ClockFit fit =
+      log.known_clock
+          ? fit_at(RunClock::of(*log.known_clock, reference_s, lines.log_start_s()), points, lines)
+          : best_fit(points, lines, reference_s);
   if (fit.is_good()) {
     return fit.clock;
   }
@@ -262,7 +268,7 @@ Result<ClockMap> match_clocks(const EncoderLog& log, const Observations& across,
       ErrorCode::AlignmentFailed,
       message("scale readings: ", where, " they ", how, " from the tracker's points, limits ",
               1e3 * kMedianLimit_m, " and ", 1e3 * kLimit_m, " mm",
-              log.known_clock ? "" : mistakes_that_fit(points, log, series.first_time_s)));
+              log.known_clock ? "" : mistakes_that_fit(points, log, reference_s)));
 }
 
 }  // namespace abbe::calib::otf

@@ -11,7 +11,7 @@ namespace abbe::calib::otf {
 /// The scale readings fit the points within a fraction of a millimetre, or AlignmentFailed; the
 /// text names reversed or swapped axes and other units of length that would fit. A known clock is
 /// only checked.
-[[nodiscard]] Result<ClockMap> match_clocks(const EncoderLog&, const Observations& across,
+[[nodiscard]] Result<RunClock> match_clocks(const EncoderLog&, const Observations& across,
                                             const BlockSeries&);
 
 }  // namespace abbe::calib::otf

@@ -71,7 +71,12 @@ Result<void> check(const EncoderLog& log) {
 }
 
 EncoderLines::EncoderLines(std::span<const EncoderReading> readings)
-    : readings_(readings), period_s_(median_period_s(readings)) {}
+    : readings_(readings.begin(), readings.end()), log_start_s_(readings.front().time_s) {
+  for (EncoderReading& r : readings_) {
+    r.time_s -= log_start_s_;
+  }
+  period_s_ = median_period_s(readings_);
+}
 
 std::optional<EncoderLine> EncoderLines::between_two(double at_s) const {
   const auto after =
@@ -83,7 +88,7 @@ std::optional<EncoderLine> EncoderLines::between_two(double at_s) const {
   if (after->time_s - (after - 1)->time_s > kGapPeriods * period_s_) {
     return std::nullopt;
   }
-  return line_through(std::span(after - 1, 2), at_s);
+  return line_through(std::span(after - 1, after + 1), at_s);
 }
 
 std::optional<EncoderLine> EncoderLines::line(double from_s, double at_s, double to_s) const {

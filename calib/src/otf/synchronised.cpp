@@ -116,17 +116,19 @@ void add_notes(Observations& o, const AlongRows& along, std::size_t jumps, std::
   }
 }
 
-Synchronisation synchronisation_of(const Identification& id, const AlongRows& along,
-                                   const NoiseOfRows& noise) {
+Synchronisation synchronisation_of(const Identification& id, const EncoderLog& log,
+                                   const AlongRows& along, const NoiseOfRows& noise) {
   const double factor2 = along.sigma_factor() * along.sigma_factor();
-  Synchronisation s{.clock = along.clock(),
+  RunClock clock = along.clock();
+  Synchronisation s{.clock = log.known_clock.value_or(clock.map()),
                     .rows = noise.rows,
                     .chi2_per_dof = factor2 * noise.noise.sigma0 * noise.noise.sigma0,
                     .sigma_factor = along.sigma_factor()};
   if (id.solution.clock.size() > 0) {
     const auto at = static_cast<Eigen::Index>(id.observations.clock_offset());
-    s.clock.offset_s += id.solution.clock(0);
-    s.clock.drift += id.solution.clock(1);
+    clock.lag_s += id.solution.clock(0);
+    clock.drift += id.solution.clock(1);
+    s.clock = clock.map();
     s.u_offset_s = std::sqrt(id.solution.covariance_with_rigid(at, at));
     s.u_drift = std::sqrt(id.solution.covariance_with_rigid(at + 1, at + 1));
   }
@@ -160,7 +162,7 @@ Result<Identification> identify_synchronised(
   }
   const WithoutJumps kept = without_jumps(*options.encoders);
   const EncoderLog& log = kept.log ? *kept.log : *options.encoders;
-  const Result<ClockMap> clock = match_clocks(log, across, series);
+  const Result<RunClock> clock = match_clocks(log, across, series);
   if (!clock) {
     return tl::unexpected(clock.error());
   }
@@ -195,7 +197,7 @@ Result<Identification> identify_synchronised(
     const double excess = noise_of.noise.sigma0 * noise_of.noise.sigma0 / variance_across(*id);
     const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 / noise_of.degrees_of_freedom);
     if (excess <= unsuspicious || round == kRounds) {
-      id->solution.synchronisation = synchronisation_of(*id, along, noise_of);
+      id->solution.synchronisation = synchronisation_of(*id, log, along, noise_of);
       add_notes(id->observations, along, kept.jumps, options.encoders->readings.size());
       return id;
     }

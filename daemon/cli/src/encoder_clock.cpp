@@ -38,6 +38,12 @@ calib::Result<calib::otf::Identification> identify_with_scales(
   return found;
 }
 
+calib::otf::ClockMap clock_of_files(const calib::otf::ClockMap& clock, const TimesOfFile& tracker,
+                                    const TimesOfFile& encoder) {
+  return {clock.offset_s + (encoder.first_time_s - tracker.first_time_s), clock.drift,
+          clock.reference_s + tracker.first_time_s};
+}
+
 std::string clock_text(const calib::otf::Synchronisation& s, double u_time_us) {
   return fmt::format(
       "clocks      scales minus tracker {:.3f} us at {:.3f} s of the tracker, standard "

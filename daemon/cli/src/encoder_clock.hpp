@@ -21,6 +21,11 @@ namespace abbe::daemon {
     const calib::otf::Path&, const calib::otf::Noise&, const calib::otf::Options&,
     const calib::otf::EncoderLog&);
 
+/// The relation of the clocks as the files have them, from that of times since their first rows.
+[[nodiscard]] calib::otf::ClockMap clock_of_files(const calib::otf::ClockMap&,
+                                                  const TimesOfFile& tracker,
+                                                  const TimesOfFile& encoder);
+
 /// Offset and drift of the clocks with standard uncertainties, and what the readings contributed:
 /// lines of the summary.
 [[nodiscard]] std::string clock_text(const calib::otf::Synchronisation&, double u_time_us);

@@ -19,6 +19,7 @@
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/path_readings.hpp"
+#include "abbe/methods/otf/time_unit.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "backlash_lines.hpp"
@@ -89,6 +90,8 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar
   auto tracker = read_tracker_csv(
       arguments.tracker, [&](double fraction) { bar.show("reading the tracker", fraction); });
   if (!tracker) return tl::make_unexpected(tracker.error());
+  if (const auto valid = check_time_unit(arguments.tracker, *tracker, *path); !valid)
+    return tl::make_unexpected(valid.error());
   std::vector<InputFile> sources{
       {std::filesystem::path(arguments.machine).filename().string(), *hash},
       path->source,
@@ -99,6 +102,8 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar
     auto read = read_encoder_csv(
         arguments.encoder, [&](double fraction) { bar.show("reading the scales", fraction); });
     if (!read) return tl::make_unexpected(read.error());
+    if (const auto valid = check_time_unit(arguments.encoder, *read, *path); !valid)
+      return tl::make_unexpected(valid.error());
     sources.push_back(read->source);
     encoder = std::move(*read);
   }
@@ -157,6 +162,8 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
   const auto other = comparison_model(active, files->config);
   std::vector<RunResiduals> residuals{
       otf::placed_residuals(found->observations, found->solution.residuals)};
+  if (auto& clocks = found->solution.synchronisation; clocks && files->encoder)
+    clocks->clock = clock_of_files(clocks->clock, files->tracker.times, files->encoder->times);
   auto verdict =
       otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate),
                  options, otf::held_out_into(residuals));

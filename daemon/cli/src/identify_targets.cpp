@@ -12,6 +12,7 @@
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/methods/otf/time_unit.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
 #include "scales_corrected.hpp"
@@ -74,6 +75,8 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, ProgressBar&
       bar.show(fmt::format("reading {}", target->second), fraction);
     });
     if (!tracker) return tl::make_unexpected(tracker.error());
+    if (const auto valid = check_time_unit(target->second, *tracker, all.path); !valid)
+      return tl::make_unexpected(valid.error());
     all.sources.push_back(tracker->source);
     all.runs.push_back({target->first, std::move(*tracker)});
   }

@@ -76,11 +76,18 @@ void check_spherical(ParsedTable& parsed) {
   }
 }
 
+/// Of a table with at least one row whose first column is the time.
+TimesOfFile times_of(const NumberTable& table) {
+  return {.first_time_s = table.at(0, 0),
+          .first_line = table.line(0),
+          .last_line = table.line(table.rows() - 1)};
+}
+
 calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t row) {
   // emScon point status "speed warning", the highest status of a valid point
   constexpr double kSpeedWarning = 1.0;
   calib::otf::TrackerObservation point;
-  point.time_s = table.at(row, 0);
+  point.time_s = table.at(row, 0) - table.at(0, 0);
   point.valid = table.at(row, 4) >= 0.0 && table.at(row, 4) <= kSpeedWarning;
 
   if (table.form() == kSpherical) {
@@ -137,7 +144,7 @@ Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
   check_time_ascends(*parsed);
   check_spherical(*parsed);
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
-  TrackerFile tracker{parsed->source, {}};
+  TrackerFile tracker{parsed->source, {}, times_of(parsed->table)};
   tracker.points.reserve(parsed->table.rows());
   for (std::size_t row = 0; row < parsed->table.rows(); ++row)
     tracker.points.push_back(observation(parsed->table, row));
@@ -152,10 +159,11 @@ Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
   check_rows(*parsed, 1, "readings");
   check_time_ascends(*parsed);
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
-  EncoderFile encoder{parsed->source, {}};
+  EncoderFile encoder{parsed->source, {}, times_of(parsed->table)};
   encoder.rows.reserve(parsed->table.rows());
   for (std::size_t row = 0; row < parsed->table.rows(); ++row)
-    encoder.rows.push_back({parsed->table.at(row, 0), position_m(parsed->table, row, 1)});
+    encoder.rows.push_back(
+        {parsed->table.at(row, 0) - encoder.times.first_time_s, position_m(parsed->table, row, 1)});
   return encoder;
 }
 

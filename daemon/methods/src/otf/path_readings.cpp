@@ -50,8 +50,8 @@ Error not_reached(const std::string& file, std::size_t vertex, const AxisPositio
                   const Closest& closest) {
   return {ErrorCode::BadInput,
           fmt::format("{}: the scales do not reach vertex {} of the path, ({:.3f}, {:.3f}, {:.3f}) "
-                      "mm: the closest reading is {:.3f} mm away, ({:.3f}, {:.3f}, {:.3f}) mm at "
-                      "{:.3f} s",
+                      "mm: the closest reading is {:.3f} mm away, ({:.3f}, {:.3f}, {:.3f}) mm, "
+                      "{:.3f} s after the first one",
                       file, vertex, 1e3 * q_m[0], 1e3 * q_m[1], 1e3 * q_m[2],
                       1e3 * closest.distance_m, 1e3 * closest.reading_m.x(),
                       1e3 * closest.reading_m.y(), 1e3 * closest.reading_m.z(), closest.time_s)};

@@ -3,7 +3,7 @@
 /// block that was measured at constant speed gives a third row:
 ///     y = a1 . (p - q(t_m)),   sigma^2 = sigma_1^2 / n + (v sigma_t)^2 f
 /// a1: direction of travel of the target, p: measured point in the machine, target offset
-/// subtracted, q: scale readings at the machine's time t_m of the block (ClockMap), n: samples in
+/// subtracted, q: scale readings at the machine's time t_m of the block (RunClock), n: samples in
 /// the block, sigma_1: standard uncertainty of a sample along a1 ([Sanders 2023] eq. (4) with a1),
 /// v: speed, sigma_t: EncoderLog::sigma_time_s, f: see EncoderLine::variance. The design of the row
 /// is that of a2 and a3, along a1. Corrections of offset and drift of the clocks are two more
@@ -37,13 +37,38 @@ struct EncoderLine {
   double variance_of_v = 0.0;  ///< relative to (v sigma_t)^2, 1/s^2
 };
 
-/// Readings in the order of time. The readings must outlive it.
+/// ClockMap with the times of both clocks relative to their first ones. A double holds the time of
+/// day since 1970 in steps of 0.24 us: sums with such a time lose the digits that an adjustment of
+/// the clocks needs; differences of two of them do not.
+struct RunClock {
+  double lag_s = 0.0;        ///< machine's clock at `reference_s`, since `log_start_s`
+  double drift = 0.0;        ///< as ClockMap::drift
+  double reference_s = 0.0;  ///< tracker's clock
+  double log_start_s = 0.0;  ///< machine's clock at the first reading
+
+  [[nodiscard]] static RunClock of(const ClockMap& map, double reference_s, double log_start_s) {
+    return {
+        map.offset_s + (reference_s - log_start_s) + map.drift * (reference_s - map.reference_s),
+        map.drift, reference_s, log_start_s};
+  }
+  [[nodiscard]] ClockMap map() const {
+    return {lag_s + (log_start_s - reference_s), drift, reference_s};
+  }
+  /// The machine's clock since the first reading.
+  [[nodiscard]] double since_start_s(double tracker_s) const {
+    const double since_reference_s = tracker_s - reference_s;
+    return since_reference_s + lag_s + drift * since_reference_s;
+  }
+};
+
+/// Readings in the order of time, with times since the first one.
 class EncoderLines {
  public:
   explicit EncoderLines(std::span<const EncoderReading>);
 
   [[nodiscard]] double period_s() const { return period_s_; }  ///< median
   [[nodiscard]] std::span<const EncoderReading> readings() const { return readings_; }
+  [[nodiscard]] double log_start_s() const { return log_start_s_; }  ///< machine's clock
   /// The line at `at_s` from the readings between `from_s` and `to_s`; through the readings before
   /// and after if there are fewer than two. nullopt if half of the readings are missing.
   [[nodiscard]] std::optional<EncoderLine> line(double from_s, double at_s, double to_s) const;
@@ -51,8 +76,8 @@ class EncoderLines {
  private:
   [[nodiscard]] std::optional<EncoderLine> between_two(double at_s) const;
 
-  std::span<const EncoderReading> readings_;
-  double period_s_ = 0.0;
+  std::vector<EncoderReading> readings_;
+  double log_start_s_ = 0.0, period_s_ = 0.0;
 };
 
 /// Adds the rows to observations across the travel, at a clock that it corrects. The log must
@@ -60,7 +85,7 @@ class EncoderLines {
 class AlongRows {
  public:
   /// `clock`: of the log where it is known, otherwise a first estimate.
-  AlongRows(const EncoderLog& log, const ClockMap& clock);
+  AlongRows(const EncoderLog& log, const RunClock& clock);
 
   /// The observations with the rows of `across` and a third row for each block at constant speed.
   [[nodiscard]] Observations added_to(const Observations& across, const BlockSeries&,
@@ -68,7 +93,7 @@ class AlongRows {
   [[nodiscard]] std::size_t clock_unknowns() const {
     return log_->known_clock ? 0 : kClockUnknowns;
   }
-  [[nodiscard]] const ClockMap& clock() const { return clock_; }
+  [[nodiscard]] const RunClock& clock() const { return clock_; }
   /// Adds the correction of offset and drift that an adjustment estimated; none if it is empty.
   void correct_clock(const Eigen::VectorXd& by);
   /// Factor of the standard uncertainties of the rows.
@@ -81,7 +106,7 @@ class AlongRows {
  private:
   const EncoderLog* log_;
   EncoderLines lines_;
-  ClockMap clock_;
+  RunClock clock_;
   double sigma_factor_ = 1.0;
   std::vector<std::size_t> left_out_;  ///< blocks, ascending
 };

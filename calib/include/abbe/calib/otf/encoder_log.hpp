@@ -13,7 +13,9 @@
 namespace abbe::calib::otf {
 
 struct EncoderReading {
-  double time_s = 0.0;            ///< machine's clock, strictly ascending
+  /// Machine's clock, strictly ascending, of any origin: the computation uses differences. Times
+  /// since 1970 are multiples of 0.24 us.
+  double time_s = 0.0;
   Vector3 q_m = Vector3::Zero();  ///< scale readings of X, Y, Z: axis position
 };
 

@@ -47,7 +47,9 @@ struct Path {
 /// One sample of the tracker. A lost sample is either an entry with valid = false or a gap in
 /// time_s.
 struct TrackerObservation {
-  double time_s = 0.0;  ///< tracker clock, strictly ascending; only order and gaps are used
+  /// Tracker clock, strictly ascending, of any origin: only differences are used. Times since 1970
+  /// are multiples of 0.24 us.
+  double time_s = 0.0;
   Vector3 p_tracker_m = Vector3::Zero();  ///< reflector centre, tracker frame; ignored if !valid
   bool valid = true;
 };

@@ -38,17 +38,26 @@ struct PathFile {
 [[nodiscard]] Result<PathFile> parse_path_csv(std::string_view text,
                                               const std::filesystem::path& file);
 
+/// Times of a file are relative to that of its first row: the time of day since 1970 would leave
+/// steps of 0.24 us in sums. The subtraction is exact.
+struct TimesOfFile {
+  double first_time_s = 0.0;  ///< as in the file
+  std::size_t first_line = 0, last_line = 0;
+};
+
 /// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]` or
 /// `time_s,x_mm,y_mm,z_mm[,status]`. Status of the device: 0 valid, 1 speed warning (valid); a
 /// point with another status remains in the sequence but is not used.
 struct TrackerFile {
   InputFile source;
-  std::vector<calib::otf::TrackerObservation> points;
+  std::vector<calib::otf::TrackerObservation> points;  ///< times: since the first point
+  TimesOfFile times{};
 };
 [[nodiscard]] Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
                                                    const ReadProgress& progress = {});
 
-/// One row of encoder.csv: `time_s,x_mm,y_mm,z_mm`, time of the machine's clock and scale readings.
+/// One row of encoder.csv: `time_s,x_mm,y_mm,z_mm`, time of the machine's clock since the first row,
+/// and scale readings.
 struct EncoderRow {
   double time_s = 0.0;
   AxisPosition reading_m{};
@@ -56,6 +65,7 @@ struct EncoderRow {
 struct EncoderFile {
   InputFile source;
   std::vector<EncoderRow> rows;
+  TimesOfFile times{};
 };
 [[nodiscard]] Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
                                                    const ReadProgress& progress = {});

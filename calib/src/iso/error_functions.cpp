@@ -123,8 +123,9 @@ Value range_of(const ErrorFunctions& functions, const Eigen::MatrixXd& rows) {
   y.maxCoeff(&high);
   y.minCoeff(&low);
   const Value difference = functions.with_u(rows.row(high) - rows.row(low));
-  const double excess = excess_of(y, centred * functions.drawn_errors(), range);
-  return {difference.value, std::hypot(difference.u, excess), !is_none(centred)};
+  const Eigen::MatrixXd drawn = centred * functions.drawn_errors();
+  return {difference.value, u_of(difference.u, y, drawn, drawn.row(high) - drawn.row(low), range),
+          !is_none(centred)};
 }
 
 Value largest_of(const ErrorFunctions& functions, const Eigen::MatrixXd& rows) {
@@ -137,8 +138,8 @@ Value largest_of(const ErrorFunctions& functions, const Eigen::MatrixXd& rows) {
   Eigen::Index at = 0;
   y.cwiseAbs().maxCoeff(&at);
   const Value value = functions.with_u(rows.row(at));
-  const double excess = excess_of(y, rows * functions.drawn_errors(), largest);
-  return {value.value, std::hypot(value.u, excess), !is_none(rows)};
+  const Eigen::MatrixXd drawn = rows * functions.drawn_errors();
+  return {value.value, u_of(value.u, y, drawn, drawn.row(at), largest), !is_none(rows)};
 }
 
 std::optional<Bidirectional> bidirectional_of(const ErrorFunctions& functions,

@@ -42,6 +42,13 @@ class ErrorFunctions {
   std::vector<bool> undetermined_;  ///< of each parameter
 };
 
+/// c y of excess_of().
+[[nodiscard]] inline Eigen::VectorXd true_size_of(const Eigen::VectorXd& y,
+                                                  const Eigen::MatrixXd& e) {
+  const double noise = e.squaredNorm() / static_cast<double>(e.cols()), size = y.squaredNorm();
+  return (size > noise ? std::sqrt(1.0 - noise / size) : 0.0) * y;
+}
+
 /// By how much noise raises the statistic s of values on average:
 ///     b = max(0, mean over drawn e of s(c y + e) - s(c y)),  c^2 = max(0, 1 - E|e|^2 / |y|^2)
 /// y: estimated values, e: a drawn error or its opposite, c y: values of the size that the true ones
@@ -49,13 +56,34 @@ class ErrorFunctions {
 template <class Statistic>
 [[nodiscard]] double excess_of(const Eigen::VectorXd& y, const Eigen::MatrixXd& e,
                                const Statistic& s) {
-  const double noise = e.squaredNorm() / static_cast<double>(e.cols()), size = y.squaredNorm();
-  const Eigen::VectorXd true_y = (size > noise ? std::sqrt(1.0 - noise / size) : 0.0) * y;
+  const Eigen::VectorXd true_y = true_size_of(y, e);
   double sum = 0.0;
   for (Eigen::Index k = 0; k < e.cols(); ++k) {
     sum += s(true_y + e.col(k)) + s(true_y - e.col(k));
   }
   return std::max(0.0, sum / (2.0 * static_cast<double>(e.cols())) - s(true_y));
+}
+
+/// Standard uncertainty of a statistic s of values of which one linear function l, with the standard
+/// uncertainty u_l, has the value s(y) at the estimate: of the difference at the two positions with the
+/// largest and the smallest value, for a range.
+///     u^2 = u_l^2 + max(b^2, mean over drawn e of (s(c y + e) - s(c y))^2 - (l e)^2)
+/// b, c, e: see excess_of(). Where e does not change which values are the largest and the smallest, s
+/// is l, and the second term is 0. Where it does, the others count with their own uncertainty: the
+/// largest value may be at a position that is not well known, while the estimate has it elsewhere.
+/// `l`: l e of each column of `e`.
+template <class Statistic>
+[[nodiscard]] double u_of(double u_l, const Eigen::VectorXd& y, const Eigen::MatrixXd& e,
+                          const Eigen::RowVectorXd& l, const Statistic& s) {
+  const Eigen::VectorXd true_y = true_size_of(y, e);
+  const double s_true = s(true_y);
+  double squares = 0.0;
+  for (Eigen::Index k = 0; k < e.cols(); ++k) {
+    const double up = s(true_y + e.col(k)) - s_true, down = s(true_y - e.col(k)) - s_true;
+    squares += 0.5 * (up * up + down * down) - l(k) * l(k);
+  }
+  const double b = excess_of(y, e, s);
+  return std::sqrt(u_l * u_l + std::max(b * b, squares / static_cast<double>(e.cols())));
 }
 
 /// The largest minus the smallest of a U over the rows a. Requires at least one row.

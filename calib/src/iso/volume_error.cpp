@@ -20,11 +20,19 @@ std::vector<Vector3> lattice_of(const LineBox& box, int per_side) {
   return points_m;
 }
 
-/// By how much noise raises the largest |V| on average. Neighbouring points of a fine lattice have
-/// the same errors: a coarse one is enough.
-double excess_of_largest(const ErrorFunctions& functions, const LineBox& box) {
+/// A point, and V there.
+struct VAtPoint {
+  Vector3 q_m = Vector3::Zero(), V_m = Vector3::Zero();
+};
+
+/// Standard uncertainty of the largest |V|: that of V at this point along V, `u_m`, and what the other
+/// points add (u_of()). Neighbouring points of a fine lattice have the same errors: a coarse one, and
+/// the point itself, are enough.
+double u_of_largest(const ErrorFunctions& functions, const LineBox& box, const VAtPoint& largest,
+                    double u_m) {
   constexpr int kPerSide = 5;
-  const std::vector<Vector3> points_m = lattice_of(box, kPerSide);
+  std::vector<Vector3> points_m = lattice_of(box, kPerSide);
+  points_m.push_back(largest.q_m);
   Eigen::VectorXd V_m(3 * std::ssize(points_m));
   Eigen::MatrixXd errors_m(V_m.size(), functions.drawn_errors().cols());
   Eigen::Index i = 0;
@@ -37,7 +45,11 @@ double excess_of_largest(const ErrorFunctions& functions, const LineBox& box) {
     }
   }
 
-  return excess_of(V_m, errors_m, [](const Eigen::VectorXd& all_m) {
+  const double size_m = largest.V_m.norm();
+  const Eigen::RowVectorXd along =
+      size_m > 0.0 ? Eigen::RowVectorXd(largest.V_m.transpose() / size_m * errors_m.bottomRows<3>())
+                   : Eigen::RowVectorXd::Zero(errors_m.cols());
+  return u_of(u_m, V_m, errors_m, along, [](const Eigen::VectorXd& all_m) {
     return std::sqrt(all_m.reshaped(3, all_m.size() / 3).colwise().squaredNorm().maxCoeff());
   });
 }
@@ -55,6 +67,7 @@ Result<VolumeError> volume_error(const VolumetricModel& model) {
   const std::vector<Vector3> lattice_m = lattice_of(*box, kPerSide);
   VolumeError e{.points = lattice_m.size()};
   std::vector<Vector3> points_m, V_m;
+  VAtPoint largest{lattice_m.front(), Vector3::Zero()};
   for (const Vector3& q_m : lattice_m) {
     const VolumetricError at = model.error_at(q_m, tool_m, estimation::AxisTravel{});
     points_m.push_back(q_m + tool_m);
@@ -66,10 +79,11 @@ Result<VolumeError> volume_error(const VolumetricModel& model) {
     if (size_m > e.largest.value) {
       const Vector3 along = at.V_m / size_m;
       e.largest = {size_m, std::sqrt(std::max(0.0, along.dot(at.cov_V_m2 * along)))};
+      largest = {q_m, at.V_m};
     }
   }
 
-  e.largest.u = std::hypot(e.largest.u, excess_of_largest(ErrorFunctions(model), *box));
+  e.largest.u = u_of_largest(ErrorFunctions(model), *box, largest, e.largest.u);
   const Result<ModelDifference> statistics = rigid_free(points_m, V_m);
   if (!statistics) {
     return tl::unexpected(statistics.error());

@@ -5,10 +5,14 @@
 /// rigid motion of the whole volume; they are therefore the same in every gauge.
 ///
 /// Uncertainty: each value f is a linear function of the parameters, f = a U, u^2 = a cov(U) a^T
-/// ([GUM] 5.2.2 eq. (13)). A range max - min is the difference at the two positions at which it
-/// occurs. The noise of the estimate makes a range, and a largest |value|, larger than the true one
-/// by b on average; the value is not corrected for it, so that u^2 = a cov(U) a^T + b^2
-/// ([GUM] F.2.4.5). A range that is not several times as large as its U is an upper limit, not an
+/// ([GUM] 5.2.2 eq. (13)). A range max - min is the difference l at the two positions at which it
+/// occurs in the estimate; the largest and the smallest of the true values may be elsewhere. So its u
+/// is that of l and the mean square of what 256 errors e drawn from cov(U) (the same in every run, on
+/// every processor) change in the range beyond l:
+///     u^2 = a cov(U) a^T + max(b^2, mean of (range(c y + e) - range(c y))^2 - (l e)^2)
+/// y: the values, c: the factor that removes from their size what noise adds to it, b: by how much
+/// noise makes a range larger than the true one on average; the value is not corrected for it ([GUM]
+/// F.2.4.5). The same for a largest |value|. A range that is not several times as large as its U is an upper limit, not an
 /// estimate. The mean and the rms of |V| are raised likewise; they have no u.
 /// Not contained: the scatter of repeated approaches (a model has no repetitions, so the A, R and
 /// s of ISO 230-2 cannot be computed), errors between the nodes, and changes after the measurement.
@@ -96,10 +100,13 @@ struct Angular {
 
 /// Diagonal displacement [ISO 230-6]: component of V along a body diagonal of the box, relative to
 /// its beginning. Name: direction of travel along X, Y, Z, P positive, N negative.
+/// M, E and B are those of the whole diagonal: of all positions at which an axis is at a node of the
+/// model, and of the extremes between them (with linear tables those of parabolas, since rotations
+/// have levers).
 struct Diagonal {
   std::string name;  ///< "PPP", "NPP", "PNP" or "NNP"
   Vector3 from_m = Vector3::Zero(), to_m = Vector3::Zero();
-  std::vector<double> along_m;  ///< distance from the beginning
+  std::vector<double> along_m;  ///< distance from the beginning: 21 positions, for curves
   std::vector<Value> mean;      ///< mean of both directions of travel, relative to the beginning
   Value M;                      ///< range of the mean
   /// Bidirectional systematic deviation: range over both directions. Absent, as B, without backlash

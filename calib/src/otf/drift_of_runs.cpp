@@ -17,28 +17,28 @@ namespace {
 
 using Columns = std::vector<std::size_t>;
 
-/// The added unknowns of all runs: the range offset if it has a prior, then the drift of each run
-/// that has one.
+/// The added unknowns of all runs: the range offset of each run if it has a prior, then the drift of
+/// each run that has one.
 class DriftUnknowns {
  public:
   explicit DriftUnknowns(std::span<const Observations> runs) {
     offsets_ = runs.front().u_range_offset_m > 0.0 ? 1 : 0;
-    size_ = offsets_;
+    size_ = offsets_ * runs.size();
     for (const Observations& o : runs) {
       Columns& own = of_run_.emplace_back();
       for (std::size_t i = 0; o.drift && i < DriftBasis(*o.drift).size(); ++i) {
         own.push_back(size_++);
       }
       Columns& seen = seen_by_.emplace_back();
-      for (std::size_t i = 0; i < offsets_; ++i) {
-        seen.push_back(i);
+      if (offsets_ > 0) {
+        seen.push_back(seen_by_.size() - 1);
       }
       seen.insert(seen.end(), own.begin(), own.end());
     }
   }
 
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] std::size_t offsets() const { return offsets_; }
+  [[nodiscard]] std::size_t offsets() const { return offsets_; }  ///< of each run: 1 or 0
   [[nodiscard]] const Columns& of_run(std::size_t run) const { return of_run_[run]; }
   /// The range offset and the drift of a run: the columns of its rows.
   [[nodiscard]] const Columns& seen_by(std::size_t run) const { return seen_by_[run]; }
@@ -53,7 +53,8 @@ class DriftUnknowns {
   }
 
  private:
-  std::size_t offsets_ = 0, size_ = 0;
+  std::size_t offsets_ = 0;  ///< of each run
+  std::size_t size_ = 0;
   std::vector<Columns> of_run_, seen_by_;
 };
 
@@ -77,7 +78,7 @@ struct OwnInformation {
   Eigen::VectorXd Pc;
 };
 
-/// The range offset has its prior, every drift at first one so wide that it tells nothing.
+/// Each range offset has its prior, every drift at first one so wide that it tells nothing.
 OwnInformation first_information(std::span<const Observations> runs, const DriftUnknowns& added) {
   constexpr double kWide_m = 100e-6;
   const auto n = static_cast<Eigen::Index>(added.size());
@@ -85,7 +86,7 @@ OwnInformation first_information(std::span<const Observations> runs, const Drift
                      Eigen::VectorXd::Zero(n)};
   if (added.offsets() > 0) {
     const double u_m = runs.front().u_range_offset_m;
-    own.P(0, 0) = 1.0 / (u_m * u_m);
+    own.P.diagonal().head(std::ssize(runs)).setConstant(1.0 / (u_m * u_m));
   }
   return own;
 }
@@ -262,8 +263,10 @@ Result<DriftOfRuns> drift_of_runs(std::span<const Observations> runs, const Adju
     factor = std::max(1.0, variance(out.residual_m));
   }
 
-  if (added.offsets() > 0) {
-    out.offset = {all.d(0), std::sqrt(std::max(0.0, all.covariance(0, 0)))};
+  out.offset.resize(runs.size());
+  for (std::size_t k = 0; added.offsets() > 0 && k < runs.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    out.offset[k] = {all.d(i), std::sqrt(std::max(0.0, all.covariance(i, i)))};
   }
   Eigen::MatrixXd covariance = reduced.dU_dd * all.covariance * reduced.dU_dd.transpose();
   for (std::size_t k = 0; k < runs.size(); ++k) {

@@ -2,7 +2,7 @@
 /// The drift of the tracker in each of several runs that have common tables (tracker_drift.hpp).
 /// Every run has a course, an amplitude and a repeatability of its own. The rows connect the
 /// drifts d_k of the runs through U:
-///     S d = g,   S, g: reduced normal equations of all drifts and of the common range offset
+///     S d = g,   S, g: reduced normal equations of all drifts and of the range offset of each run
 /// Run by run, estimate_drift() gives mean m and covariance V of d_k from the rows, with what is
 /// known about the other drifts (visits and prior: information P, P c):
 ///     S_kk - S_kr (S_rr + P_rr)^-1 S_rk,   g_k - S_kr (S_rr + P_rr)^-1 (g_r + P_r c_r)
@@ -21,10 +21,10 @@
 namespace abbe::calib::otf {
 
 struct DriftOfRuns {
-  RangeOffset offset;                              ///< if it has a prior
+  std::vector<RangeOffset> offset;                 ///< by run; 0 without a prior
   std::vector<std::optional<TrackerDrift>> drift;  ///< by run; none without visits
   Eigen::VectorXd U;
-  Eigen::MatrixXd added_covariance;  ///< what drifts and range offset add to that of U
+  Eigen::MatrixXd added_covariance;  ///< what drifts and range offsets add to that of U
   /// By run: y - A U without drift and range offset.
   std::vector<std::vector<double>> residual_m;
 };

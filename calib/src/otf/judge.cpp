@@ -63,7 +63,8 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
 
 /// Note if the data hardly determine the offset of the ranges, because the model can reproduce it;
 /// the prior then determines the estimate.
-void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, double prior_m) {
+void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, double prior_m,
+                              const std::string& run) {
   const double share = offset.u_m / prior_m;  // 1: the data determine nothing
   constexpr double kOfEqualWeight = 0.7;      // 1/sqrt(2): data and prior of equal weight
   if (!(prior_m > 0.0) || !(share > kOfEqualWeight)) {
@@ -72,6 +73,7 @@ void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, doubl
   const double u_of_data_m = offset.u_m / std::sqrt(std::max(1e-12, 1.0 - share * share));
   constexpr double kNormal99 = 2.576;
   verdict.notes.push_back(message(
+      run,
       "the run hardly determines the offset of the tracker's ranges: its stated uncertainty is ",
       1e6 * prior_m, " um, and an offset below ",
       1e6 * kNormal99 * root_sum_of_squares(u_of_data_m, prior_m), " um would not be detected"));
@@ -168,7 +170,10 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
   const CorrectionSize size = correction_size(solution.model);
   require_certainty(verdict, size.V_m, size.u_m);
   note_what_u_leaves_out(verdict, runs.front());
-  note_undetermined_offset(verdict, solution.range_offset, runs.front().u_range_offset_m);
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    note_undetermined_offset(verdict, solutions[k].range_offset, runs[k].u_range_offset_m,
+                             runs.size() == 1 ? "" : message("run ", k + 1, ": "));
+  }
   for (std::string& note : notes_on(solution.backlash)) {
     verdict.notes.push_back(std::move(note));
   }

@@ -112,28 +112,28 @@ std::vector<SparseRows::Entry> entries_at(std::span<const SparseRows::Entry> row
   return entries;
 }
 
-/// The offset common to all ranges of all runs, with its prior.
-AddedColumns::Estimate estimate_offset(std::span<const Observations> runs, const Adjustment& a,
-                                       std::span<const Residuals> residuals, double factor) {
+/// The offset of the ranges of each run, with its prior.
+AddedColumns::Estimate estimate_offsets(std::span<const Observations> runs, const Adjustment& a,
+                                        std::span<const Residuals> residuals, double factor) {
   const RunUnknowns unknowns(runs);
-  AddedColumns sums(1, unknowns.size());
+  AddedColumns sums(runs.size(), unknowns.size());
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const Observations& o = runs[k];
     const std::vector<std::size_t> at = unknowns.of_run(k);
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
-      const double c = drow_drange_offset(o, o.rows[i]);
+      const SparseRows::Entry c{k, drow_drange_offset(o, o.rows[i])};
       sums.add(o.rows[i], entries_at(o.A.row(i), at), residuals[k].after_m[i], std::span(&c, 1));
     }
   }
   return sums.estimate_with_prior(a.cofactor_Q, runs.front().u_range_offset_m, factor);
 }
 
-void subtract_offset(std::vector<Residuals>& residuals, std::span<const Observations> runs,
-                     const Eigen::VectorXd& U, double offset_m) {
+void subtract_offsets(std::vector<Residuals>& residuals, std::span<const Observations> runs,
+                      const Eigen::VectorXd& U, std::span<const RangeOffset> offsets) {
   const RunUnknowns unknowns(runs);
   for (std::size_t k = 0; k < runs.size(); ++k) {
     residuals[k].after_m =
-        residuals_m(without_range_offset(runs[k], offset_m), unknowns.part(U, k));
+        residuals_m(without_range_offset(runs[k], offsets[k].value_m), unknowns.part(U, k));
   }
 }
 
@@ -177,20 +177,20 @@ Result<Adjustment> adjust_runs(std::span<const Observations> runs, const Options
   return a;
 }
 
-/// What an adjustment of the rows states, with the offset of the ranges and the drift of the tracker
+/// What an adjustment of the rows states, with the offsets of the ranges and the drift of the tracker
 /// as further unknowns.
 struct FitOfRuns {
   Eigen::VectorXd U;
-  RangeOffset offset;
+  std::vector<RangeOffset> offset;                 ///< by run; 0 without a prior
   std::vector<std::optional<TrackerDrift>> drift;  ///< by run
-  Eigen::MatrixXd added_covariance;  ///< what range offset and drifts add to that of U
+  Eigen::MatrixXd added_covariance;  ///< what range offsets and drifts add to that of U
   std::vector<Residuals> residuals;  ///< without offset and drift, as all figures
   std::vector<Statistics> of_runs;
   Statistics all;
 };
 
 void add_drift(FitOfRuns& fit, DriftOfRuns found) {
-  fit.offset = found.offset;
+  fit.offset = std::move(found.offset);
   fit.drift = std::move(found.drift);
   fit.U = std::move(found.U);
   fit.added_covariance = std::move(found.added_covariance);
@@ -199,18 +199,23 @@ void add_drift(FitOfRuns& fit, DriftOfRuns found) {
   }
 }
 
-void add_offset(FitOfRuns& fit, std::span<const Observations> runs, const Adjustment& a) {
-  const AddedColumns::Estimate e = estimate_offset(runs, a, fit.residuals, fit.all.variance_factor);
-  fit.offset = {e.d(0), e.u(0)};
+void add_offsets(FitOfRuns& fit, std::span<const Observations> runs, const Adjustment& a) {
+  const AddedColumns::Estimate e =
+      estimate_offsets(runs, a, fit.residuals, fit.all.variance_factor);
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    fit.offset[k] = {e.d(i), e.u(i)};
+  }
   fit.U -= e.dU;
   fit.added_covariance = e.root_cov_dU * e.root_cov_dU.transpose();
-  subtract_offset(fit.residuals, runs, fit.U, fit.offset.value_m);
+  subtract_offsets(fit.residuals, runs, fit.U, fit.offset);
 }
 
 Result<FitOfRuns> fit_of_runs(std::span<const Observations> runs, const Adjustment& a,
                               const Options& options) {
   const std::size_t unknowns = RunUnknowns(runs).size();
   FitOfRuns fit{.U = a.U,
+                .offset = std::vector<RangeOffset>(runs.size()),
                 .drift = std::vector<std::optional<TrackerDrift>>(runs.size()),
                 .added_covariance = Eigen::MatrixXd::Zero(a.U.size(), a.U.size()),
                 .residuals = residuals_of_runs(runs, a.U)};
@@ -239,14 +244,14 @@ Result<FitOfRuns> fit_of_runs(std::span<const Observations> runs, const Adjustme
     add_drift(fit, *std::move(found));
     set_figures();
   } else if (runs.front().u_range_offset_m > 0.0) {
-    add_offset(fit, runs, a);
+    add_offsets(fit, runs, a);
     set_figures();
   }
   return fit;
 }
 
 /// adjust_runs(), with the prior for smooth tables that the rows of all runs permit, if there is
-/// one. The bends are judged without the range offset and the drift that the fit without a prior
+/// one. The bends are judged without the range offsets and the drift that the fit without a prior
 /// shows.
 Result<Adjustment> adjust_smooth(std::vector<Observations>& runs, const Options& options) {
   Result<Adjustment> a = adjust_runs(runs, options);
@@ -260,7 +265,7 @@ Result<Adjustment> adjust_smooth(std::vector<Observations>& runs, const Options&
   }
   std::vector<Observations> judged = runs;
   for (std::size_t k = 0; k < judged.size(); ++k) {
-    judged[k] = without_range_offset(std::move(judged[k]), first->offset.value_m);
+    judged[k] = without_range_offset(std::move(judged[k]), first->offset[k].value_m);
     if (first->drift[k]) {
       judged[k] = without_drift(std::move(judged[k]), *first->drift[k]);
     }
@@ -331,7 +336,7 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                                .T_machine_tracker = runs[k].alignment.T_machine_tracker,
                                .statistics = fit.of_runs[k],
                                .residuals = std::move(fit.residuals[k]),
-                               .range_offset = fit.offset,
+                               .range_offset = fit.offset[k],
                                .backlash = backlash_of(runs[k], a->U, a->covariance),
                                .drift = std::move(fit.drift[k]),
                                .smoothness = runs[k].smoothness});

@@ -65,7 +65,7 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
           std::move(candidate.verdict),
           s.blocks,
           s.blocks_used,
-          candidate.solution.range_offset,
+          {candidate.solution.range_offset},
           candidate.solution.synchronisation,
           candidate.solution.smoothness};
 }
@@ -191,6 +191,18 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                     run->config, std::move(run->sources));
 }
 
+/// Of one run: two numbers; of several: two arrays, in the order of the runs.
+void add_range_offsets(nlohmann::json& object, const std::vector<otf::RangeOffset>& offsets) {
+  nlohmann::json values = nlohmann::json::array(), us = nlohmann::json::array();
+  for (const otf::RangeOffset& offset : offsets) {
+    values.push_back(offset.value_m * kUmPerM);
+    us.push_back(offset.u_m * kUmPerM);
+  }
+  const bool several = offsets.size() > 1;
+  object["range_offset_um"] = several ? values : values.front();
+  object["u_range_offset_um"] = several ? us : us.front();
+}
+
 void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {
   const auto& s = outcome.document.statistics;
   const std::filesystem::path folder = arguments.out;
@@ -211,13 +223,12 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
       {"condition", s.condition},
       {"sigma0", s.sigma0},
       {"covariance_factor", s.variance_factor},
-      {"range_offset_um", outcome.range_offset.value_m * kUmPerM},
-      {"u_range_offset_um", outcome.range_offset.u_m * kUmPerM},
       {"residual_rms_before_um", s.before.rms_m * kUmPerM},
       {"residual_rms_after_um", s.after.rms_m * kUmPerM},
       {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kUmPerM},
       {"held_out_rms_after_um", outcome.verdict.held_out.candidate_rms_m * kUmPerM},
       {"gate", verdict_json(outcome.verdict)}};
+  add_range_offsets(object, outcome.range_offsets);
   if (const auto& prior = outcome.smoothness)
     object["smoothness"] = {
         {"bend_um",
@@ -251,9 +262,11 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& argume
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
 
-  if (outcome.range_offset.u_m > 0.0)
-    fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
-               outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
+  for (std::size_t run = 0; run < outcome.range_offsets.size(); ++run)
+    if (const auto& offset = outcome.range_offsets[run]; offset.u_m > 0.0)
+      fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um{}\n",
+                 offset.value_m * kUmPerM, offset.u_m * kUmPerM,
+                 outcome.range_offsets.size() > 1 ? fmt::format(" (run {})", run + 1) : "");
   if (const auto& prior = outcome.smoothness)
     fmt::print("smoothness  prior {}: chi-square {:.1f}, expected {:.1f}; left out: {}\n",
                otf::size_text(*prior), prior->chi2, prior->expected_chi2, prior->left_out());

@@ -35,7 +35,7 @@ struct OtfOutcome {
   ModelDocument document;
   calib::Verdict verdict;
   std::size_t blocks = 0, blocks_used = 0;
-  calib::otf::RangeOffset range_offset;
+  std::vector<calib::otf::RangeOffset> range_offsets;  ///< one per run
   std::optional<calib::otf::Synchronisation> synchronisation{};
   std::optional<calib::otf::Smoothness> smoothness{};
 };

@@ -147,9 +147,14 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
   if (auto air = unmeasured_air_text(all->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));
 
-  return outcome_of(
+  std::vector<calib::otf::RangeOffset> range_offsets;
+  for (const calib::otf::Solution& solution : found->solutions)
+    range_offsets.push_back(solution.range_offset);
+  auto outcome = outcome_of(
       {of_all_runs(std::move(*found)), std::move(*verdict), options.mode, std::move(residuals)},
       all->config, std::move(all->sources));
+  outcome.range_offsets = std::move(range_offsets);
+  return outcome;
 }
 
 }  // namespace abbe::daemon

@@ -13,8 +13,10 @@
 /// all runs (tracker_drift.hpp). The nests are at the same places in the tracker frame in all runs: the
 /// tracker is not set up again between runs with visits.
 ///
-/// An offset of the ranges, their scale and the scales of the axes are those of Noise, common to
-/// all runs. The noise of the residuals is treated as in solve(): correlated noise widens the
+/// Each run has an offset of its ranges of its own, with the prior of Noise: between the runs the
+/// reflector is moved, and often the tracker homed again. The offsets count as independent, as those
+/// of the runs of a joint identification. The scale of the ranges and the scales of the axes are those
+/// of Noise, common to all runs. The noise of the residuals is treated as in solve(): correlated noise widens the
 /// covariance (it is not prewhitened). The factor of the covariance is that of all residuals
 /// together, or that of one run if this is larger.
 
@@ -33,8 +35,8 @@ struct TargetRun {
 
 struct TargetsIdentification {
   std::vector<Observations> observations;  ///< one per run, with 18 tables
-  /// One per run. All have the same model and range offset; rigid, pose, residuals and statistics
-  /// are of the run, adjustment and covariance are those of all runs for the unknowns of this run.
+  /// One per run. All have the same model; rigid, pose, range offset, residuals and statistics are of
+  /// the run, adjustment and covariance are those of all runs for the unknowns of this run.
   std::vector<Solution> solutions;
   Statistics statistics;  ///< of all runs together
 

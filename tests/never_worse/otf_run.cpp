@@ -52,14 +52,31 @@ void make_machine(OtfRun& run, double spacing_m) {
   }
 }
 
-Vector3 with_noise(OtfRun& run, const Vector3& p, Vector3& held, double dt) {
-  const Vector3 fresh(normal(run.random), normal(run.random), normal(run.random));
-  const double keep = run.correlation_s > 0.0 ? std::exp(-dt / run.correlation_s) : 0.0;
-  held = keep * held + std::sqrt(1.0 - keep * keep) * fresh;
+/// Range and two angles of unit variance, correlated over `correlation_s` (0: white).
+class ReadingNoise {
+ public:
+  explicit ReadingNoise(double correlation_s) : correlation_s_(correlation_s) {}
+
+  void start(std::mt19937_64& random) { value_ = fresh(random); }
+  const Vector3& next(std::mt19937_64& random, double dt) {
+    const double keep = correlation_s_ > 0.0 ? std::exp(-dt / correlation_s_) : 0.0;
+    value_ = keep * value_ + std::sqrt(1.0 - keep * keep) * fresh(random);
+    return value_;
+  }
+
+ private:
+  static Vector3 fresh(std::mt19937_64& random) {
+    return {normal(random), normal(random), normal(random)};
+  }
+
+  double correlation_s_;
+  Vector3 value_ = Vector3::Zero();
+};
+
+Vector3 with_noise(const Vector3& p, const Vector3& noise, double range_m, double angle_rad) {
   const Vector3 er = p.normalized();
   const Vector3 e1 = er.unitOrthogonal(), e2 = er.cross(e1);
-  const double across_m = run.sigma_angle_rad * p.norm();
-  return p + run.sigma_range_m * held.x() * er + across_m * (held.y() * e1 + held.z() * e2);
+  return p + range_m * noise.x() * er + angle_rad * p.norm() * (noise.y() * e1 + noise.z() * e2);
 }
 
 void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& model) {
@@ -170,7 +187,7 @@ void set_up_again(OtfRun& run) {
   }
 }
 
-OtfRun random_otf_run(std::uint64_t seed) {
+OtfRun random_otf_run(std::uint64_t seed, double least_cells, double most_cells) {
   OtfRun run;
   run.random.seed(seed);
   std::mt19937_64& random = run.random;
@@ -179,7 +196,7 @@ OtfRun random_otf_run(std::uint64_t seed) {
   run.machine.chain = *calib::KinematicChain::parse(chain);
 
   for (sim::AxisTruth& axis : run.truth.axes) {
-    const double half_m = kNode_m * std::round(uniform(random, 4.0, 8.0));
+    const double half_m = kNode_m * std::round(uniform(random, least_cells, most_cells));
     const double centre_m = kNode_m * std::round(uniform(random, -4.0, 4.0));
     axis.range = {centre_m - half_m, centre_m + half_m, centre_m};
   }
@@ -352,7 +369,12 @@ std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
   const double stand_s = std::max(0.4, run.dwell_s);
   const double dt = 1.0 / run.rate_hz, end_s = motion.duration_s() + stand_s;
   std::vector<calib::otf::TrackerObservation> samples;
-  Vector3 held(normal(run.random), normal(run.random), normal(run.random));
+  ReadingNoise noise(run.correlation_s), slow(run.slow_s);
+  noise.start(run.random);
+  const bool has_slow = run.slow_range_m > 0.0 || run.slow_angle_rad > 0.0;
+  if (has_slow) {
+    slow.start(run.random);
+  }
   const calib::Matrix3 R = run.T_machine_tracker.R.transpose();
   const Vector3 shaken_m = run.vibration_m > 0.0 ? Vector3(run.vibration_m * direction(run.random))
                                                  : Vector3(Vector3::Zero());
@@ -371,7 +393,10 @@ std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
     }
 
     Vector3 seen = R * (p - run.T_machine_tracker.t_m);
-    seen = with_noise(run, seen, held, dt);
+    seen = with_noise(seen, noise.next(run.random, dt), run.sigma_range_m, run.sigma_angle_rad);
+    if (has_slow) {
+      seen = with_noise(seen, slow.next(run.random, dt), run.slow_range_m, run.slow_angle_rad);
+    }
     seen *= run.range_scale + run.range_offset_m / seen.norm();
 
     if (run.spikes > 0.0 && uniform(run.random, 0.0, 1.0) < run.spikes) {

@@ -31,7 +31,9 @@ struct OtfRun {
   Vector3 scale = Vector3::Ones();
   double range_scale = 1.0, range_offset_m = 0.0;
   double sigma_range_m = 2e-6, sigma_angle_rad = 3e-6;
-  double correlation_s = 0.0;             ///< correlation time of the noise; 0: white
+  double correlation_s = 0.0;  ///< correlation time of the noise; 0: white
+  /// Second noise of the readings, beside the first and correlated over slow_s.
+  double slow_range_m = 0.0, slow_angle_rad = 0.0, slow_s = 0.0;
   double lost_from = 0.0, lost_to = 0.0;  ///< share of the run without a beam
   double spikes = 0.0;                    ///< share of the samples with an error of 0.2 mm
   double feed_m_per_s = 5.0 / 60.0, rate_hz = 100.0;
@@ -53,7 +55,9 @@ struct OtfRun {
 
 [[nodiscard]] std::vector<Fault<OtfRun>> otf_faults();
 
-[[nodiscard]] OtfRun random_otf_run(std::uint64_t seed);
+/// Half the length of each axis is between `least_cells` and `most_cells` distances of 50 mm.
+[[nodiscard]] OtfRun random_otf_run(std::uint64_t seed, double least_cells = 4.0,
+                                    double most_cells = 8.0);
 /// The tracker stands elsewhere; the errors of its ranges and of the scales are drawn again with
 /// their stated uncertainties.
 void set_up_again(OtfRun&);

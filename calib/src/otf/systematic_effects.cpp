@@ -1,5 +1,7 @@
 #include "otf/systematic_effects.hpp"
 
+#include <vector>
+
 #include "axis_scale_columns.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/row_residuals.hpp"
@@ -8,16 +10,16 @@ namespace abbe::calib::otf {
 
 Eigen::VectorXd dg_drange_scale(const Observations& o, const WhitenedRows& rows) {
   const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
-  const auto of_row = [&](std::size_t i) {
-    const Observation& row = o.rows[i];
-    return row.direction.dot(row.axis_position_m + o.target_offset_m - tracker_m);
-  };
+  std::vector<double> s_m;
+  for (const Observation& row : o.rows) {
+    s_m.push_back(row.direction.dot(row.axis_position_m + o.target_offset_m - tracker_m));
+  }
+  s_m = rows.values(s_m);
 
   Eigen::VectorXd g = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    const double s_m = rows.value(i, of_row);
     for (const SparseRows::Entry& e : rows.row(i)) {
-      g(static_cast<Eigen::Index>(e.column)) += o.rows[i].weight * e.value * s_m;
+      g(static_cast<Eigen::Index>(e.column)) += o.rows[i].weight * e.value * s_m[i];
     }
   }
   return g;
@@ -34,11 +36,14 @@ WithRangeOffset with_range_offset(const Observations& o, const WhitenedRows& row
                                   const Adjustment& a, std::span<const double> residual_m,
                                   double factor) {
   AddedColumns sums(1, o.unknowns());
+  std::vector<double> c;
+  for (const Observation& row : o.rows) {
+    c.push_back(drow_drange_offset(o, row));
+  }
+  c = rows.values(c);
+  const std::vector<double> r_m = rows.values(residual_m);
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    const double c =
-        rows.value(i, [&](std::size_t row) { return drow_drange_offset(o, o.rows[row]); });
-    const double r_m = rows.value(i, [&](std::size_t row) { return residual_m[row]; });
-    sums.add(o.rows[i], rows.row(i), r_m, std::span(&c, 1));
+    sums.add(o.rows[i], rows.row(i), r_m[i], std::span(&c[i], 1));
   }
 
   const AddedColumns::Estimate e =

@@ -1,24 +1,46 @@
 #include "otf/whitened_rows.hpp"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace abbe::calib::otf {
 namespace {
 
-/// factor times row, added to `sum`; columns ascend in both.
-void add_row(std::vector<SparseRows::Entry>& sum, std::span<const SparseRows::Entry> row,
-             double factor) {
-  auto at = sum.begin();
-  for (const SparseRows::Entry& e : row) {
-    at = std::lower_bound(
-        at, sum.end(), e.column,
-        [](const SparseRows::Entry& s, std::size_t column) { return s.column < column; });
-    if (at == sum.end() || at->column != e.column) {
-      at = sum.insert(at, {e.column, 0.0});
+SlowNoise in_units_of_white(const TrackerNoise& noise) {
+  const auto variance = [&](double s) { return s * s / noise.white_factor; };
+  const double of_angle = variance(noise.slow_angle_rad);
+  return {
+      .variance = {variance(noise.slow_range_m), of_angle, of_angle, variance(noise.slow_along_m)},
+      .correlation_time = noise.correlation_time};
+}
+
+/// Means over the rows, by component.
+std::array<double, 3> correlations(const Observations& o, const NoiseSeries& series,
+                                   const SlowNoise& noise) {
+  const SlowNoiseStep step = slow_noise_step(series.block_duration(), noise.correlation_time);
+  const auto product = [&](std::size_t i, std::size_t j) {
+    double sum = 0.0;
+    for (std::size_t s = 0; s < series.sources; ++s) {
+      sum += noise.variance[s] * series.response[i][s] * series.response[j][s];
     }
-    at->value += factor * e.value;
+    return sum;
+  };
+  const auto variance = [&](std::size_t i) {
+    return 1.0 + step.stationary_variance_m() * product(i, i);
+  };
+
+  std::array<double, 3> sum{}, pairs{};
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    if (const auto before = row_before(o, i)) {
+      sum[o.rows[i].component] +=
+          step.mean * step.mean * product(i, *before) / std::sqrt(variance(i) * variance(*before));
+      pairs[o.rows[i].component] += 1.0;
+    }
   }
+  for (std::size_t c = 0; c < sum.size(); ++c) {
+    sum[c] = pairs[c] > 0.0 ? sum[c] / pairs[c] : 0.0;
+  }
+  return sum;
 }
 
 }  // namespace
@@ -34,49 +56,51 @@ std::optional<std::size_t> row_before(const Observations& o, std::size_t i) {
   return std::nullopt;
 }
 
-std::vector<std::size_t> rows_before(const Observations& o, std::size_t i, std::size_t most) {
-  std::vector<std::size_t> found;
-  while (found.size() < most) {
-    const std::optional<std::size_t> before = row_before(o, i);
-    if (!before) {
-      break;
+WhitenedRows::WhitenedRows(const Observations& o, const TrackerNoise& noise)
+    : o_(o), series_(noise_series(o)) {
+  const SlowNoise slow = in_units_of_white(noise);
+  whitening_.emplace(series_, slow);
+  variance_factor_ = noise.white_factor * whitening_->mean_variance();
+  root_of_mean_variance_ = std::sqrt(whitening_->mean_variance());
+  lag_1_ = correlations(o, series_, slow);
+
+  RowMatrix A = RowMatrix::Zero(std::ssize(o.rows), static_cast<Eigen::Index>(o.unknowns()));
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    for (const SparseRows::Entry& e : o.A.row(i)) {
+      A(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(e.column)) = e.value;
     }
-    found.push_back(i = *before);
   }
-  return found;
+  apply(A);
+
+  std::vector<SparseRows::Entry> row;
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    row.clear();
+    for (Eigen::Index j = 0; j < A.cols(); ++j) {
+      if (A(i, j) != 0.0) {
+        row.push_back({static_cast<std::size_t>(j), A(i, j)});
+      }
+    }
+    A_.append(row);
+  }
 }
 
-WhitenedRows::WhitenedRows(const Observations& o, const NoiseFilter& filter)
-    : o_(o), white_(filter.is_white()) {
-  std::vector<SparseRows::Entry> sum;
-  for (std::size_t i = 0; !white_ && i < o.rows.size(); ++i) {
-    const Autoregression& noise = filter.of_direction[o.rows[i].component];
-    const std::vector<std::size_t> before = rows_before(o, i, noise.order);
-    const std::size_t order = before.size();
-    const double scale = 1.0 / std::sqrt(noise.variance[order]);
-    const auto add = [&](std::size_t row, double factor) {
-      terms_.push_back({row, factor});
-      add_row(sum, o.A.row(row), factor);
-    };
-
-    sum.clear();
-    add(i, scale);
-    for (std::size_t lag = 1; lag <= order; ++lag) {
-      const double ratio = o.rows[i].sigma_m / o.rows[before[lag - 1]].sigma_m;
-      add(before[lag - 1], -scale * noise.coefficient[order][lag - 1] * ratio);
-    }
-
-    A_.append(sum);
-    first_term_.push_back(terms_.size());
+void WhitenedRows::apply(RowMatrix& columns) const {
+  if (!whitening_) {
+    return;
+  }
+  for (std::size_t i = 0; i < o_.rows.size(); ++i) {
+    columns.row(static_cast<Eigen::Index>(i)) /= o_.rows[i].sigma_m;
+  }
+  whitening_->apply(columns);
+  for (std::size_t i = 0; i < o_.rows.size(); ++i) {
+    columns.row(static_cast<Eigen::Index>(i)) *= o_.rows[i].sigma_m * root_of_mean_variance_;
   }
 }
 
 std::vector<double> WhitenedRows::values(std::span<const double> of_rows) const {
-  std::vector<double> all(of_rows.size());
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    all[i] = value(i, [&](std::size_t row) { return of_rows[row]; });
-  }
-  return all;
+  RowMatrix column = Eigen::Map<const RowMatrix>(of_rows.data(), std::ssize(of_rows), 1);
+  apply(column);
+  return {column.data(), column.data() + column.size()};
 }
 
 }  // namespace abbe::calib::otf

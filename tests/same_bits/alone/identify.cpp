@@ -91,8 +91,9 @@ void print_on_the_fly_from_blocks() {
   print_model("on-the-fly, blocks", must(solution, "solve").model);
 }
 
-/// Spherical readings of a tracker 2.5 m away, 2 um and 3 urad; a machine with errors of 30 um.
-void print_on_the_fly_from_samples() {
+/// A tracker 2.5 m away with noise of 6 um, and with `slow_m` also a noise correlated over 50
+/// samples; a machine with errors of 30 um.
+void print_on_the_fly_from_samples(const char* name, double slow_m) {
   using namespace abbe::tests::otf;
   const otf::Machine machine = coarse_machine("[w X' b Y Z (C1) t]");
   const otf::Path path = case_a_path();
@@ -101,18 +102,24 @@ void print_on_the_fly_from_samples() {
   Eigen::VectorXd U(static_cast<Eigen::Index>(layout.model_size()));
   for (double& u : U) u = 30e-6 * normal.next();
   std::vector<otf::TrackerObservation> samples;
+  Vector3 slow = Vector3::Zero();
 
   for (const Vector3& q : drive(path, 0.4, 250.0)) {
     const Vector3& t = machine.target_offset_m;
     const Vector3 p = q + t + volumetric_error(layout, {U.data(), layout.model_size()}, q, t);
     const std::array noise{normal.next(), normal.next(), normal.next()};  // braces: in this order
     samples.push_back({static_cast<double>(samples.size()) / 250.0,
-                       p - Vector3(2.0, 1.0, -1.2) + 6e-6 * Vector3(noise.data()), true});
+                       p - Vector3(2.0, 1.0, -1.2) + 6e-6 * Vector3(noise.data()) + slow_m * slow,
+                       true});
+    slow = 0.98 * slow + 0.2 * Vector3(noise.data());
   }
 
   const otf::Options options{.block_samples = 10, .orientation = {.scales_agree = true}};
   const auto run = otf::identify(samples, machine, path, {}, options);
-  print_model("on-the-fly, samples", must(run, "identify").solution.model);
+  print_model(name, must(run, "identify").solution.model);
+  if (slow_m > 0.0) {
+    return;
+  }
   const auto verdict = otf::judge(run->observations, run->solution, nullptr, {}, options);
   Hash hash;
   hash.add(must(verdict, "judge").held_out.candidate_rms_m);
@@ -149,7 +156,8 @@ int main() {
   print_elementary();
   print_spherical();
   print_on_the_fly_from_blocks();
-  print_on_the_fly_from_samples();
+  print_on_the_fly_from_samples("on-the-fly, samples", 0.0);
+  print_on_the_fly_from_samples("on-the-fly, correlated noise", 3e-6);
   print_ball_array("ball array, bayes-pose", evemu::Estimator::BayesPose);
   print_ball_array("ball array, scad", evemu::Estimator::Scad);
 }

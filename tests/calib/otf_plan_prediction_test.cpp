@@ -63,8 +63,9 @@ TEST(PlanPrediction, BasePathIsThatOfThePrototype) {
 }
 
 /// The uncertainties that the adjustment of a run states, in which noise does not matter.
-TEST(PlanPrediction, AgreesWithTheCovarianceOfARun) {
-  const MadeRun made = make_run({.noise_factor = 0.0, .error_scale_m = 0.1e-6});
+void expect_covariance_of_a_run(double u_range_offset_m) {
+  MadeRun made = make_run({.noise_factor = 0.0, .error_scale_m = 0.1e-6});
+  made.noise.u_range_offset_m = u_range_offset_m;
   const auto solution = identify(made.samples, made.machine, made.path, made.noise, made.options);
   ASSERT_TRUE(solution) << solution.error().text;
   PlannedRun run{.machine = made.machine,
@@ -84,6 +85,24 @@ TEST(PlanPrediction, AgreesWithTheCovarianceOfARun) {
     // blocks of 10 samples here, of 5 in the prediction: other blocks near the ends of the legs
     EXPECT_NEAR(table.max_u, most, 0.1 * most) << table.name;
   }
+}
+
+TEST(PlanPrediction, AgreesWithTheCovarianceOfARun) {
+  expect_covariance_of_a_run(0.0);
+}
+
+TEST(PlanPrediction, AgreesWithTheCovarianceOfARunWhoseRangesMayHaveAnOffset) {
+  expect_covariance_of_a_run(50e-6);
+}
+
+TEST(PlanPrediction, IsLargerWithAnOffsetOfTheRanges) {
+  PlannedRun run = coarse_run();
+  const auto without = predict(case_a_path(), run);
+  run.noise.u_range_offset_m = 50e-6;
+  const auto with = predict(case_a_path(), run);
+  ASSERT_TRUE(without && with);
+  EXPECT_GT(with->rms_u_m, without->rms_u_m);
+  EXPECT_GT(with->max_u_m, without->max_u_m);
 }
 
 TEST(PlanPrediction, MapStatesTheUncertaintyOfEveryPlace) {

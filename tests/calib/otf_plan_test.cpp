@@ -24,8 +24,8 @@ PlannedRun few_nodes() {
 const PlanOptions kWalk{.lattice = 3, .exchanges = 0};
 constexpr double kLength_m = 14.0;
 
-double rms_um(const Path& path) {
-  const auto p = predict(path, few_nodes());
+double rms_um(const Path& path, const PlannedRun& run = few_nodes()) {
+  const auto p = predict(path, run);
   return p ? 1e6 * p->rms_u_m : std::nan("");
 }
 
@@ -47,6 +47,18 @@ TEST(OtfPlan, EstimateIsThePredictedUncertainty) {
   const auto planned = plan(few_nodes(), {.length_m = kLength_m}, kWalk);
   ASSERT_TRUE(planned) << planned.error().text;
   EXPECT_NEAR(1e6 * planned->rms_u_m, rms_um(planned->path), 0.02 * rms_um(planned->path));
+}
+
+/// Legs that look alike from the tracker do not show the offset.
+TEST(OtfPlan, DeterminesAnOffsetOfTheRanges) {
+  PlannedRun run = few_nodes();
+  run.noise.u_range_offset_m = 50e-6;
+  const PlanOptions improved{.lattice = 3, .exchanges = 300};
+  const auto with = plan(run, {.length_m = kLength_m}, improved),
+             without = plan(few_nodes(), {.length_m = kLength_m}, improved);
+  ASSERT_TRUE(with && without);
+  EXPECT_NEAR(1e6 * with->rms_u_m, rms_um(with->path, run), 0.02 * rms_um(with->path, run));
+  EXPECT_LT(rms_um(with->path, run), rms_um(without->path, run));
 }
 
 TEST(OtfPlan, IsImprovedAfterTheWalk) {

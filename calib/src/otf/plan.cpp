@@ -77,14 +77,16 @@ Result<Path> too_short(const PlanProblem& problem, std::span<const Vector3> latt
   return failure(ErrorCode::BadInput, message("plan: the budget is too short: ", walked_m, " m"));
 }
 
-/// Multiples of 0.1 mm inside the travel, or its ends.
+/// Multiples of 0.1 mm inside the travel, or its ends, with the same bits as those of a file with
+/// these numbers in mm.
 Path rounded(Path path, const MachineNodes& nodes) {
-  constexpr double kPerM = 1e4;
+  constexpr double kPerMm = 10.0, kMmPerM = 1e3;
   for (Vector3& q : path.vertices_m) {
     for (Eigen::Index k = 0; k < 3; ++k) {
       const std::vector<double>& nodes_m = nodes[static_cast<std::size_t>(k)].nodes_m;
       if (q[k] != nodes_m.front() && q[k] != nodes_m.back()) {
-        q[k] = std::clamp(std::round(kPerM * q[k]) / kPerM, nodes_m.front(), nodes_m.back());
+        const double rounded_m = std::round(kPerMm * kMmPerM * q[k]) / kPerMm / kMmPerM;
+        q[k] = std::clamp(rounded_m, nodes_m.front(), nodes_m.back());
       }
     }
   }

@@ -11,6 +11,7 @@
 #include "message.hpp"
 #include "otf/plan_rows.hpp"
 #include "otf/plan_volume.hpp"
+#include "otf/systematic_effects.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -110,6 +111,17 @@ Result<void> check_all(const Path& path, const PlannedRun& run) {
   return check_observable(path, run.machine, run.backlash);
 }
 
+/// As the adjustment of a run has it: an offset of the ranges is one more unknown with a prior.
+Eigen::MatrixXd covariance_of(const Observations& o, const Adjustment& a) {
+  if (!(o.u_range_offset_m > 0.0)) {
+    return a.covariance;
+  }
+  const std::vector<double> no_residuals(o.rows.size(), 0.0);
+  const Eigen::MatrixXd root =
+      with_range_offset(o, WhitenedRows(o), a, no_residuals, 1.0).root_of_covariance;
+  return a.covariance + root * root.transpose();
+}
+
 }  // namespace
 
 Result<Prediction> predict(const Path& path, const PlannedRun& run, std::size_t row_points) {
@@ -126,10 +138,11 @@ Result<Prediction> predict(const Path& path, const PlannedRun& run, std::size_t 
     return tl::unexpected(a.error());
   }
 
+  const Eigen::MatrixXd covariance = covariance_of(*o, *a);
   const RigidFreeVolume volume(o->layout(), run.machine.target_offset_m);
-  Prediction p{.rms_u_m = volume.rms_u_m(a->covariance),
-               .tables = uncertainties_of(o->layout(), a->covariance),
-               .backlash = uncertainties_of_backlash(*o, a->covariance),
+  Prediction p{.rms_u_m = volume.rms_u_m(covariance),
+               .tables = uncertainties_of(o->layout(), covariance),
+               .backlash = uncertainties_of_backlash(*o, covariance),
                .unused = note_on_unused(*o),
                .left_out = tables_left_out(o->layout()),
                .observations = o->rows.size(),
@@ -140,7 +153,7 @@ Result<Prediction> predict(const Path& path, const PlannedRun& run, std::size_t 
                .length_m = lengths_to_vertices_m(path).back(),
                .duration_s = duration_s(path, run.drive)};
   for (const Vector3& q : map_places(run.machine.nodes)) {
-    p.map.push_back({q, volume.u_m(q, a->covariance)});
+    p.map.push_back({q, volume.u_m(q, covariance)});
     p.max_u_m = std::max(p.max_u_m, p.map.back().u_m);
   }
   return p;

@@ -72,7 +72,7 @@ Eigen::MatrixXd rows_times(std::span<const PointRows> points, const Eigen::Matri
 
 PlanProblem::PlanProblem(const PlannedRun& run, const ParameterLayout& layout)
     : run_(run), layout_(layout) {
-  const auto n = static_cast<Eigen::Index>(layout.fit_size());
+  const Eigen::Index n = unknowns();
   const RigidFreeVolume volume(layout, run.machine.target_offset_m);
   G_ = Eigen::MatrixXd::Zero(n, n);
   G_.topLeftCorner(volume.G().rows(), volume.G().cols()) = volume.G();
@@ -109,6 +109,13 @@ PointRows PlanProblem::rows_at(const Leg& leg, double share, std::size_t points)
     rows.along_a3[rows.count] = a3.dot(c.dV_dU);
     ++rows.count;
   }
+  if (has_range_offset()) {
+    const Vector3 beam = (p - run_.tracker_m).normalized();
+    rows.column[rows.count] = unknowns() - 1;
+    rows.along_a2[rows.count] = a2.dot(beam);
+    rows.along_a3[rows.count] = a3.dot(beam);
+    ++rows.count;
+  }
   return rows;
 }
 
@@ -117,14 +124,17 @@ Eigen::MatrixXd PlanProblem::prior() const {
   // Wide: the alignment of a run has no prior.
   constexpr double kStation_m = 1e-3, kStation_rad = 1e-3;
   const auto n = static_cast<Eigen::Index>(layout_.fit_size());
-  Eigen::VectorXd u = Eigen::VectorXd::Constant(n, kNode_rad);
+  Eigen::VectorXd u = Eigen::VectorXd::Constant(unknowns(), kNode_rad);
   for (const Table& table : layout_.tables()) {
     u.segment(static_cast<Eigen::Index>(table.offset),
               static_cast<Eigen::Index>(layout_.node_count(table.motion.axis)))
         .setConstant(is_rotation(table.motion.motion) ? kNode_rad : kNode_m);
   }
   u.segment(n - 6, 3).setConstant(kStation_m);
-  u.tail(3).setConstant(kStation_rad);
+  u.segment(n - 3, 3).setConstant(kStation_rad);
+  if (has_range_offset()) {
+    u(n) = run_.noise.u_range_offset_m;
+  }
   return u.array().square().inverse().matrix().asDiagonal();
 }
 

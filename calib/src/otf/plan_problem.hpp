@@ -20,8 +20,9 @@ struct Leg {
 
 /// The two whitened rows of one point: same columns, values along a2 and a3.
 struct PointRows {
-  std::array<Eigen::Index, DesignColumns::kCapacity> column;
-  std::array<double, DesignColumns::kCapacity> along_a2, along_a3;
+  static constexpr std::size_t kCapacity = DesignColumns::kCapacity + 1;  // range offset
+  std::array<Eigen::Index, kCapacity> column;
+  std::array<double, kCapacity> along_a2, along_a3;
   std::size_t count = 0;
 };
 
@@ -48,8 +49,8 @@ class PlanProblem {
   /// Points of a leg at most `spacing_m` apart; 0 for a leg within the corner exclusions.
   [[nodiscard]] std::size_t points_of(const Leg&, double spacing_m = kSpacing_m) const;
 
-  /// No leg: a prior of 50 um and 100 urad for each node. It is negligible once a path determines
-  /// the model.
+  /// No leg: a prior of 50 um and 100 urad for each node, which is negligible once a path determines
+  /// the model, and that of the range offset.
   [[nodiscard]] Eigen::MatrixXd prior() const;
   /// Adds `factor` times the information of the leg to the lower triangle of H.
   void add(const Leg&, double factor, Eigen::MatrixXd& H, double spacing_m = kSpacing_m) const;
@@ -65,9 +66,15 @@ class PlanProblem {
  private:
   [[nodiscard]] PointRows rows_at(const Leg&, double share, std::size_t points) const;
 
+  /// With Noise::u_range_offset_m the offset of all ranges is the last unknown.
+  [[nodiscard]] bool has_range_offset() const { return run_.noise.u_range_offset_m > 0.0; }
+  [[nodiscard]] Eigen::Index unknowns() const {
+    return static_cast<Eigen::Index>(layout_.fit_size()) + (has_range_offset() ? 1 : 0);
+  }
+
   PlannedRun run_;
   ParameterLayout layout_;
-  Eigen::MatrixXd G_;       ///< fit_size() x fit_size(), zero for the rigid unknowns
+  Eigen::MatrixXd G_;       ///< unknowns() x unknowns(), zero for those that are not of the model
   Eigen::MatrixXd root_G_;  ///< G = root_G root_G^T
 };
 

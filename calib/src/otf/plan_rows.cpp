@@ -122,6 +122,7 @@ Result<Observations> planned_observations(const Path& path, const PlannedRun& ru
 
   Observations o = *std::move(empty);
   o.alignment.T_machine_tracker.t_m = run.tracker_m;
+  o.u_range_offset_m = run.noise.u_range_offset_m;
   const Result<std::size_t> first = first_with_backlash(o);
   if (!first) {
     return tl::unexpected(first.error());

@@ -246,7 +246,11 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
                tracker_m[0] * kMmPerM, tracker_m[1] * kMmPerM, tracker_m[2] * kMmPerM,
                rms_u_m * kUmPerM, tracker_m == plan.run.tracker_m ? " (chosen)" : "");
   }
-  fmt::print("standard uncertainty of V without the rigid motion, from white noise alone:\n");
+  const double u_offset_um = plan.run.noise.u_range_offset_m * kUmPerM;
+  fmt::print("standard uncertainty of V without the rigid motion, from white noise {}:\n",
+             u_offset_um > 0.0
+                 ? fmt::format("and an offset of the ranges of {:.4g} um", u_offset_um)
+                 : "alone");
   print_prediction("path", plan.prediction);
   if (plan.base)
     print_prediction("base path", *plan.base);
@@ -339,8 +343,8 @@ void add_plan_otf(CLI::App& parent, int& exit) {
       "Plan the path of an on-the-fly calibration: the path with the smallest predicted "
       "uncertainty\n"
       "for its length, beside the usual path of edges and diagonals. Writes path.csv, map.csv,\n"
-      "plan.json and programs for the control to OUT. White noise alone is predicted; turbulence\n"
-      "adds to it.");
+      "plan.json and programs for the control to OUT. White noise is predicted, and an offset of\n"
+      "the ranges ([tracker] u_range_offset_um); turbulence adds to it.");
   add_machine_options(*command, *arguments);
   command
       ->add_option(

@@ -5,9 +5,10 @@
 /// estimates it is the smallest possible one (Cramer-Rao bound):
 ///     CRB_rms = sqrt(trace(G Cov)),   G = mean over the volume of (P M B)^T (P M B)
 /// M B: columns of the model at a place, P: removes the best-fit rigid motion of the volume.
-/// Noise: white, as Noise states it. Not contained: Noise::u_scale, u_axis_scale and
-/// u_range_offset_m, correlated noise (turbulence makes the errors several times larger), drift,
-/// and errors of the machine between the nodes. Units: m, rad, s. Pure.
+/// Noise: white, as Noise states it, and an offset of all ranges with the prior
+/// Noise::u_range_offset_m, which is one more unknown. Not contained: Noise::u_scale and
+/// u_axis_scale, correlated noise (turbulence makes the errors several times larger), drift, and
+/// errors of the machine between the nodes. Units: m, rad, s. Pure.
 
 #include <array>
 #include <cstddef>

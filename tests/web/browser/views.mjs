@@ -26,8 +26,10 @@ async function firstView({ page }) {
     ? [`the first view took ${took_ms.join(", ")} ms, more than ${longest_ms}`] : [];
 }
 
-/** X, Y, Z in mm; B and C, which swing by 0.1 rad, in degrees. */
+/** X, Y, Z in mm; B and C, which swing by 0.1 rad, in degrees. The positions come after the page. */
 async function axesFaults({ page }) {
+  await page.waitForFunction(() => [...document.querySelectorAll(".axis .value")]
+    .every((value) => value.innerText.match(/[0-9]/)), { timeout: 10000 }).catch(() => {});
   const shown = await page.$$eval(".axis", (cards) => cards.map((c) =>
     [c.querySelector(".name").innerText, c.querySelector(".value").innerText]));
   const [names, values] = [0, 1].map((i) => shown.map((card) => card[i]));

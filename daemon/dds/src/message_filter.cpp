@@ -8,24 +8,16 @@
 
 #include "abbe/dds/fragment_reassembly.hpp"
 #include "announced_values.hpp"
+#include "announcement_check.hpp"
 #include "protected_structure.hpp"
-#include "rtps_fields.hpp"
+#include "submessage.hpp"
 
 namespace abbe::dds {
 namespace {
 
 using namespace rtps_message;
-using Bytes = std::span<std::uint8_t>;
 
-/// Replaces the kind of a submessage that must not be read. The kind is not assigned, so a receiver
-/// skips the submessage [DDSI-RTPS 2.5, 9.4.5.1.1].
-constexpr std::uint8_t kSkipped = 0x7f;
 constexpr std::size_t kInfoSourcePrefixAt = 8, kInfoSourceBytes = 20;
-constexpr std::size_t kToInlineQos = 4;  // octetsToInlineQos counts from the end of its own field
-/// Limits of octetsToInlineQos. Reader id, writer id and sequence number take 16 bytes; Fast DDS
-/// replaces a smaller value by 16. Fast DDS reads a signed 16-bit number, hence the upper limit.
-constexpr std::size_t kShortestToInlineQos = 16, kLongestToInlineQos = 0x7fff;
-
 /// Entity ids of the writers that announce participants, writers and readers: kind c2, ids 0001,
 /// 0003 and 0004.
 constexpr std::uint32_t kParticipantsWriter = 0x000100c2, kPublicationsWriter = 0x000003c2,
@@ -34,69 +26,6 @@ constexpr std::uint32_t kParticipantsWriter = 0x000100c2, kPublicationsWriter = 
 /// Security, whose messages may be fragments.
 constexpr std::uint32_t kLivelinessWriter = 0x000200c2, kAuthenticationWriter = 0x000201c3,
                         kKeysWriter = 0xff0202c3;
-/// Key hash and status info (disposed, unregistered) of a sample.
-constexpr std::uint16_t kKeyHash = 0x0070, kStatusInfo = 0x0071;
-/// Longest announcement: those of abbe have less than 1 kB, with a TypeObject several. A stranger may
-/// announce thousands, with user data that is kept.
-constexpr std::size_t kLongestAnnouncement = 16384;
-/// Parameter of a participant: how long it counts as alive without a message. Three times the
-/// longest interval of announcements that is usual (30 s): a participant that announced an endless
-/// lease, and left, would stay in memory.
-constexpr std::uint16_t kParticipantLease = 0x0002;
-constexpr std::uint32_t kLongestLease_s = 100;
-/// Parameters that the topics of abbe do not need, and that end Fast DDS or take its memory:
-/// TypeInformation, TypeObject, TypeIdentifier, content filter, data sharing (Fast DDS).
-constexpr std::array<std::uint16_t, 5> kBlankedParameters{0x0075, 0x0072, 0x0069, 0x0035, 0x8006};
-constexpr std::uint16_t kEndpointGuid = 0x005a;
-constexpr std::uint16_t kSentinel = 0x0001;
-/// Replaces the ids of these parameters. This id is vendor-specific and has no bit "must
-/// understand", so a receiver skips a parameter with it.
-constexpr std::uint16_t kUnusedParameterId = 0xbfff;
-
-using Reader = FieldReader<std::uint8_t>;
-
-/// An entity id is four bytes in big-endian order, whatever the byte order of the submessage.
-std::uint32_t entity_id(Bytes bytes, std::size_t at) {
-  std::uint32_t id = 0;
-  for (std::size_t i = 0; i < 4; ++i) id = id << 8 | bytes[at + i];
-  return id;
-}
-
-/// A user's writer or reader, not one of those that every participant has [DDSI-RTPS 2.5, 9.3.1.2].
-bool is_users(std::uint32_t entity) {
-  return (entity & 0xc0u) != 0xc0u;
-}
-
-/// Calls use(id, offset of the id) for every parameter of the list that begins at `at`. Returns the
-/// offset behind the sentinel that ends the list. Returns nullopt if the length of a parameter is
-/// not a multiple of four, as the standard requires [DDSI-RTPS 2.5, 9.4.2.11], or exceeds the list:
-/// DDS implementations interpret such a list differently.
-template <class Use>
-std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, Use use) {
-  for (; at + 4 <= list.size();) {
-    const std::uint16_t id = list.u16(at);
-    const std::size_t length = list.u16(at + 2);
-    if (id == kSentinel) return length == 0 ? std::optional{at + 4} : std::nullopt;
-    if (length % 4 != 0 || length > list.size() - at - 4) return std::nullopt;
-    use(id, at);
-    at += 4 + length;
-  }
-  return std::nullopt;
-}
-
-/// A submessage, to be changed in place: its kind and flags in the header, and its body.
-struct Submessage {
-  std::uint8_t& kind;
-  std::uint8_t& flags;
-  Bytes body;
-  /// Signed by DDS Security: a change would make the receiver drop it. Its sender is trusted.
-  bool is_signed = false;
-  std::span<const std::uint8_t, kHeaderBytes> header;  ///< with the GUID prefix of the sender
-  const SequenceWindow* window = nullptr;              ///< nullptr: numbers are not limited
-  Reassembly* reassembly = nullptr;  ///< nullptr: fragments of authentication are skipped
-  [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
-  [[nodiscard]] Reader reader() const { return {body, has(kLittleEndian)}; }
-};
 
 /// The number that a reader waits for from the writer whose entity id is at `at`; nullopt: unknown.
 std::optional<std::uint64_t> next_of(const Submessage& submessage, std::size_t at) {
@@ -118,80 +47,11 @@ bool announces_endpoint(std::uint32_t writer) {
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;
 }
 
-/// What a DATA submessage contains, by offsets in its body.
-struct DataLayout {
-  std::size_t payload = 0;  ///< behind the inline QoS
-  bool not_alive = false;   ///< the status says disposed or unregistered
-};
-
 /// Whether Fast DDS can calculate with the sequence number at `at`: it asserts that the high word is
 /// not the largest. A writer that sends a million samples a second reaches kMost in 146,000 years.
 bool is_countable(const Submessage& submessage, std::size_t at) {
   constexpr std::uint64_t kMost = std::uint64_t{1} << 62;
   return at + 8 <= submessage.body.size() && submessage.reader().sequence_number(at) < kMost;
-}
-
-/// Finds the payload, and blanks the key hash of a user's sample. nullopt if the submessage does not
-/// conform to the standard: Fast DDS could read its parameters at another offset.
-std::optional<DataLayout> read_data(const Submessage& data, bool users) {
-  Reader reader = data.reader();
-  const std::size_t to_inline_qos = reader.u16(2);
-  if (to_inline_qos < kShortestToInlineQos || to_inline_qos > kLongestToInlineQos)
-    return std::nullopt;
-  DataLayout layout{.payload = kToInlineQos + to_inline_qos};
-  if (!data.has(kInlineQos)) return layout;
-
-  const auto end =
-      walk_parameters(reader, layout.payload, [&](std::uint16_t id, std::size_t offset) {
-        const std::size_t length = reader.u16(offset + 2);
-        if (id == kStatusInfo && length > 0)  // four octets; the last one has the flags
-          layout.not_alive |= data.body[offset + 4 + std::min<std::size_t>(length, 4) - 1] != 0;
-        if (id == kKeyHash && users) reader.put_u16(offset, kUnusedParameterId);
-      });
-  if (!end) return std::nullopt;
-  layout.payload = *end;
-  return layout;
-}
-
-void limit_lease(Reader& list, std::size_t offset) {
-  constexpr std::size_t kToValue = 4, kLeaseBytes = 8;  // seconds, fraction
-  // Unsigned: negative numbers, which stand for an endless lease, are large.
-  if (list.u16(offset + 2) < kLeaseBytes || list.u32(offset + kToValue) < kLongestLease_s) return;
-  list.put_u32(offset + kToValue, kLongestLease_s);
-  list.put_u32(offset + kToValue + 4, 0);
-}
-
-/// What becomes of an announcement.
-enum class Announcement {
-  Passes,       ///< without the parameters that must not be read, and with a limited lease
-  Malformed,    ///< a value has a wrong length, or the endpoint is another participant's
-  DropMessage,  ///< the list does not conform to the standard: the message must be dropped
-};
-
-Announcement check_announcement(const Submessage& data) {
-  constexpr std::size_t kToValue = 4;
-  const Bytes body = data.body;
-  const auto layout = read_data(data, false);
-  if (!layout) return Announcement::DropMessage;
-  const std::size_t at = layout->payload;
-  if (!data.has(kWithData | kWithKey)) return Announcement::Passes;
-  if (at + 4 > body.size()) return Announcement::DropMessage;
-  const bool little_endian = (body[at + 1] & 1) != 0;  // PL_CDR_LE is 00 03, PL_CDR_BE is 00 02
-
-  Reader list(body, little_endian);
-  bool valid = body[at] == 0 && (body[at + 1] == 2 || body[at + 1] == 3);
-  const auto end = walk_parameters(list, at + 4, [&](std::uint16_t id, std::size_t offset) {
-    if (std::ranges::find(kBlankedParameters, id) != kBlankedParameters.end())
-      list.put_u16(offset, kUnusedParameterId);
-    if (id == kParticipantLease) limit_lease(list, offset);
-    const auto value = body.subspan(offset + kToValue, list.u16(offset + 2));
-    valid = valid && has_valid_lengths(id, value, little_endian);
-    if (id == kEndpointGuid)
-      valid = valid && std::ranges::equal(value.first(kPrefixBytes),
-                                          data.header.subspan(kPrefixAt, kPrefixBytes));
-  });
-  if (!end) return Announcement::DropMessage;
-  return valid ? Announcement::Passes : Announcement::Malformed;
 }
 
 /// Replaces a DATA submessage by a GAP of its sequence number: a reliable reader counts the sample
@@ -241,9 +101,8 @@ bool check_data(const Submessage& data) {
   constexpr std::size_t kShortestLivelinessPayload = 20;  // encapsulation, GUID prefix, kind
   if (data.body.size() < kShortest || !is_countable(data, kNumberAt)) return false;
   const std::uint32_t writer = entity_id(data.body, kWriterAt);
-  const bool is_long = data.body.size() > kLongestAnnouncement;
   if (writer == kParticipantsWriter) {
-    const auto announcement = is_long ? Announcement::Malformed : check_announcement(data);
+    const auto announcement = check_announcement(data);
     if (announcement == Announcement::Malformed) data.kind = kSkipped;
     return announcement != Announcement::DropMessage;
   }
@@ -255,7 +114,7 @@ bool check_data(const Submessage& data) {
     return true;
   }
   if (announces_endpoint(writer)) {
-    const auto announcement = is_long ? Announcement::Malformed : check_announcement(data);
+    const auto announcement = check_announcement(data);
     // Skipped, it would keep the reader from all later announcements.
     if (announcement == Announcement::Malformed) replace_by_gap(data);
     return announcement != Announcement::DropMessage;

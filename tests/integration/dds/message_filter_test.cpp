@@ -1,5 +1,4 @@
 #include "abbe/dds/message_filter.hpp"
-#include "abbe/dds/fragment_reassembly.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,47 +8,12 @@
 #include <tuple>
 #include <vector>
 
+#include "filter_messages.hpp"
+
 namespace abbe::dds {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-
-constexpr std::uint8_t kPublications = 0x03, kSubscriptions = 0x04, kSomebodys = 0x12;
-constexpr std::uint16_t kTypeObject = 0x0072, kTypeInformation = 0x0075, kDurability = 0x001d;
-
-void append_u16(Bytes& out, std::uint16_t v, bool little_endian = true) {
-  const auto low = static_cast<std::uint8_t>(v & 0xff), high = static_cast<std::uint8_t>(v >> 8);
-  out.insert(out.end(), {little_endian ? low : high, little_endian ? high : low});
-}
-
-/// A DATA submessage of `writer` with `rest` behind its sequence number.
-Bytes data_message(std::uint8_t writer, std::uint8_t flags, std::uint16_t to_inline_qos,
-                   const Bytes& rest, std::uint8_t kind = 0x15) {
-  const bool little_endian = (flags & 1) != 0;
-  Bytes body{0, 0};  // extra flags
-  append_u16(body, to_inline_qos, little_endian);
-  body.insert(body.end(), {0, 0, 0, 0, 0, 0, writer, 0xc2, 0, 0, 0, 0, 1, 0, 0, 0});
-  body.insert(body.end(), rest.begin(), rest.end());
-  Bytes message{'R', 'T', 'P', 'S', 2, 3, 1, 15, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-  message.insert(message.end(), {kind, flags});
-  append_u16(message, static_cast<std::uint16_t>(body.size()), little_endian);
-  message.insert(message.end(), body.begin(), body.end());
-  return message;
-}
-
-/// One DATA submessage with a list of parameters, each of four bytes.
-Bytes announcement(std::uint8_t writer, const std::vector<std::uint16_t>& parameters,
-                   bool little_endian = true, std::uint8_t kind = 0x15) {
-  Bytes list{0, static_cast<std::uint8_t>(little_endian ? 3 : 2), 0, 0};
-  for (const auto id : parameters) {
-    append_u16(list, id, little_endian);
-    append_u16(list, 4, little_endian);
-    list.insert(list.end(), {1, 2, 3, 4});
-  }
-  append_u16(list, 1, little_endian);
-  append_u16(list, 0, little_endian);
-  return data_message(writer, little_endian ? 5 : 4, 16, list, kind);
-}
+using namespace test_messages;
 
 struct MessageFilter : testing::TestWithParam<bool> {};
 
@@ -159,15 +123,6 @@ TEST(MessageFilterInput, LeavesAWithdrawalWithoutAListAlone) {
   EXPECT_EQ(message, untouched);
 }
 
-/// A submessage of a user's writer, entity 00000102.
-Bytes users_data(std::uint8_t flags, const Bytes& rest, std::uint8_t kind = 0x15) {
-  Bytes message = data_message(kSomebodys, flags, 16, rest, kind);
-  message[34] = 1, message[35] = 2;  // its writer id: 00 00 01 02
-  return message;
-}
-constexpr std::size_t kKindAt = 20, kBodyAt = 24;
-const Bytes kDisposed{0x71, 0, 4, 0, 0, 0, 0, 1, 1, 0, 0, 0};
-
 /// A reliable reader waits for each sequence number, so a sample must not only be taken away.
 TEST(MessageFilterOfSamples, ReplacesADisposedInstanceByAGapOfItsNumber) {
   for (const std::uint8_t status : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{3}}) {
@@ -223,82 +178,12 @@ TEST(MessageFilterOfSamples, PassesASampleWithContentAndBlanksItsKeyHash) {
   EXPECT_TRUE(std::equal(before.begin() + kBodyAt + 22, before.end(), &message[kBodyAt + 22]));
 }
 
-const Bytes kAuthentication{0, 2, 1, 0xc3}, kKeys{0xff, 2, 2, 0xc3};  // writers
-
-/// Fragments `first` to `first` + `count` - 1 of a sample, each of 64 bytes.
-Bytes fragment_message(const Bytes& writer, std::uint8_t first, std::uint8_t count,
-                       std::uint8_t sample_size, const Bytes& payload) {
-  Bytes rest{first, 0, 0, 0, count, 0, 64, 0, sample_size, 0, 0, 0};
-  rest.insert(rest.end(), payload.begin(), payload.end());
-  Bytes message = data_message(0, 1, 28, rest, 0x16);
-  std::copy(writer.begin(), writer.end(), &message[kBodyAt + 8]);
-  return message;
-}
-
 TEST(MessageFilterOfSamples, SkipsFragmentsOfUsersAndOfKeysWithoutSignature) {
   for (Bytes message : {users_data(1, {1, 0, 0, 0, 1, 0, 64, 0, 128, 0, 0, 0, 7, 7, 7, 7}, 0x16),
                         fragment_message(kKeys, 1, 1, 128, Bytes(64, 7))}) {
     EXPECT_EQ(filter_message(message), message.size());
     EXPECT_EQ(message[kKindAt], 0x7f);
   }
-}
-
-struct FragmentsOfAuthentication : testing::Test {
-  /// The message that `fragment` completes.
-  std::optional<Bytes> completed_by(Bytes fragment) {
-    Reassembly reassembly{fragments, {}};
-    EXPECT_EQ(filter_message(fragment, Protection::Messages, nullptr, &reassembly),
-              fragment.size());
-    EXPECT_EQ(fragment[kKindAt], 0x7f) << "not passed as a fragment";
-    EXPECT_LE(reassembly.messages.size(), 1u);
-    if (reassembly.messages.empty()) return std::nullopt;
-    return reassembly.messages.front();
-  }
-  FragmentReassembly fragments;
-};
-
-TEST_F(FragmentsOfAuthentication, AreReassembled) {
-  Bytes sample(140);
-  for (std::size_t i = 0; i < sample.size(); ++i) sample[i] = static_cast<std::uint8_t>(i);
-  const auto part = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
-    return Bytes(sample.begin() + from, sample.begin() + to);
-  };
-  const auto fragment = [&](std::uint8_t first, std::uint8_t count, std::uint8_t size,
-                            const Bytes& payload) {
-    return fragment_message(kAuthentication, first, count, size, payload);
-  };
-  EXPECT_FALSE(completed_by(fragment(3, 1, 140, part(128, 140))));
-  EXPECT_FALSE(completed_by(fragment(3, 1, 140, part(128, 140))));
-  EXPECT_FALSE(completed_by(fragment(2, 1, 140, part(64, 70)))) << "too short";
-  EXPECT_FALSE(completed_by(fragment(1, 1, 141, part(0, 64)))) << "of another sample";
-  Bytes expected = data_message(0, 5, 16, sample);
-  std::copy(kAuthentication.begin(), kAuthentication.end(), &expected[kBodyAt + 8]);
-  EXPECT_EQ(completed_by(fragment(1, 2, 140, part(0, 128))), expected);
-}
-
-TEST_F(FragmentsOfAuthentication, AreKeptOfAFewSamples) {
-  const auto part = [](std::size_t sample, std::uint8_t first) {
-    Bytes message = fragment_message(kAuthentication, first, 1, 192, Bytes(64));
-    message[kBodyAt + 16] = static_cast<std::uint8_t>(sample);  // sequence number
-    return message;
-  };
-  for (std::size_t i = 0; i <= FragmentReassembly::kMostSamples; ++i)
-    for (const std::uint8_t first : {std::uint8_t{1}, std::uint8_t{3}})
-      EXPECT_FALSE(completed_by(part(i, first)));
-  for (std::size_t i = FragmentReassembly::kMostSamples; i > 0; --i)
-    EXPECT_TRUE(completed_by(part(i, 2))) << i;
-  EXPECT_FALSE(completed_by(part(0, 2))) << "the oldest was discarded";
-}
-
-Bytes gap_message(std::uint32_t start, std::uint32_t base) {
-  Bytes message = users_data(1, Bytes(12), 0x08);
-  Bytes body{0, 0, 0, 0, 0, 0, 1, 2};
-  for (const auto number : {0u, start, 0u, base, 0u})
-    for (int i = 0; i < 4; ++i) body.push_back(static_cast<std::uint8_t>(number >> (8 * i)));
-  message.resize(kBodyAt);
-  message.insert(message.end(), body.begin(), body.end());
-  message[kKindAt + 2] = static_cast<std::uint8_t>(body.size());
-  return message;
 }
 
 /// Fast DDS marks each number of it, and would neither end nor keep its memory.
@@ -489,120 +374,6 @@ TEST(MessageFilterOfSamples, TakesTimeStampsAway) {
                 0,   0,   0,   0,   0x09, 1, 8, 0,  0xff, 0xff, 0xff, 0x7f, 0, 0, 0, 0};
   EXPECT_EQ(filter_message(message), message.size());
   EXPECT_EQ(message[kKindAt + 1], 3);
-}
-
-/// Submessages as in a message with DDS Security.
-Bytes message_of(const std::vector<Bytes>& submessages) {
-  const Bytes sample = users_data(3, kDisposed);
-  Bytes message(sample.begin(), sample.begin() + kKindAt);
-  for (const Bytes& submessage : submessages)
-    message.insert(message.end(), submessage.begin(), submessage.end());
-  return message;
-}
-Bytes submessage(std::uint8_t kind, const Bytes& body) {
-  Bytes bytes{kind, 1, static_cast<std::uint8_t>(body.size()), 0};
-  bytes.insert(bytes.end(), body.begin(), body.end());
-  return bytes;
-}
-Bytes disposal() {
-  const Bytes sample = users_data(3, kDisposed);
-  return {sample.begin() + kKindAt, sample.end()};
-}
-const Bytes kMessagePrefix = submessage(0x33, Bytes(20)),
-            kMessagePostfix = submessage(0x34, Bytes(20)), kPrefix = submessage(0x31, Bytes(20)),
-            kPostfix = submessage(0x32, Bytes(20));
-
-std::size_t passed(Bytes message, Protection protection) {
-  return filter_message(message, protection);
-}
-
-/// A change would break the signature. Without DDS Security the prefix means nothing.
-TEST(MessageFilterOfSamples, DoesNotChangeWhatIsSignedIfTheParticipantIsSecured) {
-  for (const Bytes& signed_message : {message_of({kMessagePrefix, disposal(), kMessagePostfix}),
-                                      message_of({kPrefix, disposal(), kPostfix})}) {
-    for (const auto protection : {Protection::Profile, Protection::Messages}) {
-      Bytes message = signed_message;
-      EXPECT_EQ(filter_message(message, protection), message.size());
-      EXPECT_EQ(message, signed_message);
-    }
-    Bytes message = signed_message;
-    EXPECT_EQ(filter_message(message), message.size());
-    EXPECT_EQ(message[kKindAt + 24], 0x08);
-  }
-}
-
-/// A stranger can put the prefix of a protected submessage in front of his own.
-TEST(MessageFilterOfSamples, TakesOnlyTheProtectedSubmessageAsSigned) {
-  Bytes message = message_of({kPrefix, disposal(), kPostfix, disposal()});
-  EXPECT_EQ(filter_message(message, Protection::Profile), message.size());
-  EXPECT_EQ(message[kKindAt + 24], 0x15) << "signed";
-  EXPECT_EQ(message[kKindAt + 48 + disposal().size()], 0x08) << "not signed";
-}
-
-/// Fast DDS drops a message at a signed submessage whose key it does not have. The last message of
-/// authentication, which gives the key, may be behind one of Cyclone DDS.
-TEST(MessageFilterOfSamples, PassesAuthenticationBehindASignedSubmessageAlone) {
-  Bytes payload{0, 1, 0, 0};
-  payload.resize(204);
-  payload[4 + 96] = 1;  // length of an empty class with its NUL; no tokens
-  Bytes alone = data_message(0, 5, 16, payload);
-  std::copy(kAuthentication.begin(), kAuthentication.end(), &alone[kBodyAt + 8]);
-  const Bytes authentication(alone.begin() + kKindAt, alone.end());
-
-  const auto filtered = [](Bytes& message) {
-    FragmentReassembly fragments;
-    Reassembly reassembly{fragments, {}};
-    EXPECT_EQ(filter_message(message, Protection::Messages, nullptr, &reassembly), message.size());
-    return reassembly.messages;
-  };
-  Bytes behind = message_of({kPrefix, disposal(), kPostfix, authentication});
-  EXPECT_EQ(filtered(behind), std::vector<Bytes>({alone}));
-  EXPECT_EQ(behind[behind.size() - authentication.size()], 0x7f);
-
-  for (const Bytes& first : {alone, message_of({authentication, kPrefix, disposal(), kPostfix})}) {
-    Bytes message = first;
-    EXPECT_EQ(filtered(message), std::vector<Bytes>{});
-    EXPECT_EQ(message, first);
-  }
-}
-
-/// Fast DDS computes with the stated lengths before it checks a signature.
-TEST(MessageFilterOfSamples, DropsAnotherStructureThanThatOfDdsSecurity) {
-  const Bytes body = submessage(0x30, {0, 0, 0, 4, 1, 2, 3, 4});
-  const std::vector<Bytes> right{
-      message_of({kPrefix, body, kPostfix}),
-      message_of({kMessagePrefix, kPrefix, body, kPostfix, disposal(), kMessagePostfix}),
-      message_of({kMessagePrefix, body, kMessagePostfix})};
-  for (const Bytes& message : right)
-    EXPECT_EQ(passed(message, Protection::Messages), message.size());
-
-  Bytes open = disposal(), with_macs = submessage(0x32, Bytes(20));
-  open[2] = open[3] = 0;
-  with_macs[4 + 19] = 1;  // states one more MAC than it has
-  const Bytes long_body = submessage(0x30, {0xff, 0xff, 0xff, 0xff, 1, 2, 3, 4});
-  for (const Bytes& message :
-       {message_of({kMessagePrefix, disposal()}), message_of({kMessagePrefix, open}),
-        message_of({disposal(), kMessagePrefix, disposal(), kMessagePostfix}),
-        message_of({kMessagePrefix, disposal(), kMessagePostfix, disposal()}),
-        message_of({disposal(), kMessagePostfix}), message_of({kPrefix, body}),
-        message_of({kPrefix, open}), message_of({kPrefix, kPostfix}),
-        message_of({kPrefix, body, body, kPostfix}), message_of({kPrefix, long_body, kPostfix}),
-        message_of({kPrefix, body, with_macs}), message_of({body}), message_of({kPostfix}),
-        message_of({submessage(0x31, Bytes(16)), body, kPostfix})})
-    for (const auto protection : {Protection::Profile, Protection::Messages})
-      EXPECT_EQ(passed(message, protection), 0u) << testing::PrintToString(message);
-}
-
-/// Fast DDS 2.9 takes unsigned samples and heartbeats as those of the participant that they state.
-TEST(MessageFilterOfSamples, SkipsUnsignedOnesWhereEveryMessageIsSigned) {
-  const Bytes sample = users_data(5, {0, 1, 0, 0, 1, 2, 3, 4});
-  for (Bytes message : {sample, gap_message(5, 6), announcement(kPublications, {kDurability})}) {
-    const std::uint8_t kind = message[kKindAt];
-    EXPECT_EQ(filter_message(message, Protection::Profile), message.size());
-    EXPECT_EQ(message[kKindAt], kind);
-    EXPECT_EQ(filter_message(message, Protection::Messages), message.size());
-    EXPECT_EQ(message[kKindAt], 0x7f);
-  }
 }
 
 /// Fast DDS delivers to the reader that is stated, also from an unknown writer.

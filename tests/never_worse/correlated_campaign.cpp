@@ -194,20 +194,6 @@ bool measure_accuracy(int machines, std::uint64_t first_seed, std::span<const do
   return met;
 }
 
-/// A line through the reference (straightness: a parabola), `by` where it is largest.
-void change_table(OtfRun& run, const std::string& table, double by) {
-  const calib::ErrorMotion e = *calib::error_motion(table);
-  sim::AxisTruth& axis = run.truth.axes[calib::index(e.axis)];
-  sim::ErrorFunction& error = axis.error[static_cast<std::size_t>(e.motion)];
-  std::vector<double> values(error.values().begin(), error.values().end());
-  const double half_m = 0.5 * (axis.range.max_m - axis.range.min_m);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const double way = (error.nodes_m()[i] - axis.range.reference_m) / half_m;
-    values[i] += by * (calib::is_straightness(e) ? 1.0 - way * way : way);
-  }
-  error = error.with_values(std::move(values));
-}
-
 struct Alarms {
   int pairs = 0, at_default = 0, at_5_percent = 0, changed = 0, changes_found = 0, errors = 0;
 };
@@ -254,7 +240,7 @@ void compare_runs_of_a_machine(Alarms& alarms, std::mutex& mutex, double correla
       std::string("E") +
       static_cast<char>('A' + calib::index(base.machine.chain.order_w_to_t()[0])) + first;
   const bool of_length = seed % 2 == 0;
-  change_table(base, of_length ? straightness : roll, of_length ? 4e-6 : 12e-6);
+  move_table(base, of_length ? straightness : roll, of_length ? 4e-6 : 12e-6);
   count(next_run(base, ++number), alarms.changes_found, nullptr, alarms.changed);
 }
 

@@ -416,6 +416,23 @@ std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
   return samples;
 }
 
+void move_table(OtfRun& run, const std::string& table, double by) {
+  if (table == "EC0Y") {
+    run.truth.squareness.C0Y_rad += by;
+    return;
+  }
+  const calib::ErrorMotion e = *calib::error_motion(table);
+  sim::AxisTruth& axis = run.truth.axes[calib::index(e.axis)];
+  sim::ErrorFunction& error = axis.error[static_cast<std::size_t>(e.motion)];
+  std::vector<double> values(error.values().begin(), error.values().end());
+  const double half_m = 0.5 * (axis.range.max_m - axis.range.min_m);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double way = (error.nodes_m()[i] - axis.range.reference_m) / half_m;
+    values[i] += by * (calib::is_straightness(e) ? 1.0 - way * way : way);
+  }
+  error = error.with_values(std::move(values));
+}
+
 Outcome identify_and_compare(OtfRun run) {
   const auto samples = measure(run);
   const calib::otf::Path path{run.path_m};

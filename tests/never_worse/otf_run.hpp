@@ -62,6 +62,10 @@ struct OtfRun {
 /// their stated uncertainties.
 void set_up_again(OtfRun&);
 
+/// Adds a line through the reference (straightness: a parabola) to a true table, `by` where it is
+/// largest; "EC0Y": to this squareness.
+void move_table(OtfRun&, const std::string& table, double by);
+
 /// The tracker's samples of the run. Draws from run.random.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> measure(OtfRun& run);
 

@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "abbe/calib/estimation/information.hpp"
 #include "abbe/calib/otf/prewhitening.hpp"
 #include "check_stopped.hpp"
 #include "elementary.hpp"
+#include "message.hpp"
 #include "otf/gauge_of.hpp"
 #include "otf/noise_whitening.hpp"
 #include "otf/priors.hpp"
@@ -57,12 +59,25 @@ class Scales {
   std::array<double, 3> mean_square_{};
 };
 
+double least_node_distance_m(const Observations& o) {
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const Axis axis : kAllAxes) {
+    const std::vector<double>& nodes_m = o.layout().nodes()[index(axis)].nodes_m;
+    for (std::size_t i = 1; i < nodes_m.size(); ++i) {
+      least_m = std::min(least_m, nodes_m[i] - nodes_m[i - 1]);
+    }
+  }
+  return least_m;
+}
+
 /// Groups contain nearly all that the rows contain about U if they are short compared with the
-/// distance of the nodes (50 mm), at a third of the cost. 0: the rows are few.
+/// distance of the nodes, at a third of the cost. 0: the rows are few.
 double group_m(const Observations& o) {
-  constexpr double kGroup_m = 25e-3;
+  constexpr double kLongestGroup_m = 25e-3, kOfNodeDistance = 0.5;
   constexpr std::size_t kEnoughRows = 10;  // per unknown
-  return o.rows.size() > kEnoughRows * o.unknowns() ? kGroup_m : 0.0;
+  return o.rows.size() > kEnoughRows * o.unknowns()
+             ? std::min(kLongestGroup_m, kOfNodeDistance * least_node_distance_m(o))
+             : 0.0;
 }
 
 /// log |A^T V^-1 A| and the generalised least squares solution, from the grouped rows.
@@ -369,6 +384,10 @@ Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const doubl
     if (change.dot(best.information * change) < kConverged) {
       break;
     }
+  }
+  if (!std::isfinite(best.value.objective)) {
+    return failure(ErrorCode::NotConverged,
+                   "noise of the tracker: its likelihood is not a number: repeat the run");
   }
   return noise_at(scales, best);
 }

@@ -18,7 +18,9 @@
 /// ([Patterson 1971], [Harville 1977]): residuals are smaller and less correlated than the noise,
 /// because the unknowns U follow it, and the restricted likelihood
 ///     -2 l = log |V| + log |A^T V^-1 A| + (y - A U)^T V^-1 (y - A U),   V: covariance of the rows
-/// corrects for it. U: generalised least squares with V. The Kalman filter of x(t) gives V^-1 and
+/// corrects for it. The offset of the ranges and the drift of the tracker are not among these
+/// unknowns: with reference nests, the noise that the drift follows is not corrected for.
+/// U: generalised least squares with V. The Kalman filter of x(t) gives V^-1 and
 /// |V| ([Schweppe 1965]): rows become (row_i - prediction from all earlier rows) / sqrt(variance
 /// of the prediction). These prewhitened rows are then adjusted as independent ones.
 
@@ -45,7 +47,7 @@ struct TrackerNoise {
 [[nodiscard]] bool is_correlated(const Observations&, std::span<const double> residual_m);
 
 /// `residual_m`: y - A U of every row with any U, without range offset and drift of the tracker.
-/// NotConverged if Options::stopped returns true.
+/// NotConverged if Options::stopped returns true, or if the likelihood is not a number.
 [[nodiscard]] Result<TrackerNoise> estimate_noise(const Observations&,
                                                   std::span<const double> residual_m,
                                                   const Options& = {});

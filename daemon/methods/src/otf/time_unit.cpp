@@ -25,11 +25,13 @@ struct TimedPlace {
   Vector3 p_m = Vector3::Zero();
 };
 
-/// Places at equal distances in the sequence, about kParts.
+/// Places at equal distances in the sequence. Parts are short compared with the time from one vertex
+/// to the next, so that a dwell is not in the parts in which the machine moves.
 template <class Rows, class Place>
-std::vector<TimedPlace> thinned(const Rows& rows, const Place& place_of) {
-  constexpr std::size_t kParts = 500;
-  const std::size_t stride = std::max<std::size_t>(1, rows.size() / kParts);
+std::vector<TimedPlace> thinned(const Rows& rows, const PathFile& path, const Place& place_of) {
+  constexpr std::size_t kLeastParts = 500, kPartsOfLeg = 20;
+  const std::size_t parts = std::max(kLeastParts, kPartsOfLeg * path.vertices_m.size());
+  const std::size_t stride = std::max<std::size_t>(1, rows.size() / parts);
   std::vector<TimedPlace> places;
   for (std::size_t i = 0; i < rows.size(); i += stride)
     if (const std::optional<TimedPlace> place = place_of(rows[i])) places.push_back(*place);
@@ -97,8 +99,10 @@ std::string unit_that_fits(double v_m_per_s, const Expected& expected) {
 
 Result<void> check(const std::filesystem::path& file, const TimesOfFile& times,
                    const std::vector<TimedPlace>& places, const PathFile& path) {
+  constexpr std::size_t kLeastOfLeg = 4;
   const auto v_m_per_s = speed_m_per_s(places, length_m(path));
-  const Expected expected = expected_speed(path);
+  Expected expected = expected_speed(path);
+  if (places.size() < kLeastOfLeg * path.vertices_m.size()) expected.lowest_m_per_s = 0.0;
   if (!v_m_per_s || expected.contains(*v_m_per_s)) return {};
   return fail(
       ErrorCode::BadInput,
@@ -114,17 +118,18 @@ Result<void> check(const std::filesystem::path& file, const TimesOfFile& times,
 
 Result<void> check_time_unit(const std::filesystem::path& file, const TrackerFile& tracker,
                              const PathFile& path) {
-  const auto places = thinned(
-      tracker.points, [](const calib::otf::TrackerObservation& p) -> std::optional<TimedPlace> {
-        if (!p.valid) return std::nullopt;
-        return TimedPlace{p.time_s, p.p_tracker_m};
-      });
+  const auto places =
+      thinned(tracker.points, path,
+              [](const calib::otf::TrackerObservation& p) -> std::optional<TimedPlace> {
+                if (!p.valid) return std::nullopt;
+                return TimedPlace{p.time_s, p.p_tracker_m};
+              });
   return check(file, tracker.times, places, path);
 }
 
 Result<void> check_time_unit(const std::filesystem::path& file, const EncoderFile& encoder,
                              const PathFile& path) {
-  const auto places = thinned(encoder.rows, [](const EncoderRow& row) {
+  const auto places = thinned(encoder.rows, path, [](const EncoderRow& row) {
     return std::optional(TimedPlace{row.time_s, vector_of(row.reading_m)});
   });
   return check(file, encoder.times, places, path);

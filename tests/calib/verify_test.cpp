@@ -324,6 +324,17 @@ TEST(Verification, SaysWhatTheDataDoNotAllow) {
             ErrorCode::NotApplicable);
 }
 
+/// The means of places mix rows that are in the opposite order.
+TEST(Verification, NamesTheOppositeOrderAlsoOfRepeatedShots) {
+  auto points = measured(tests::evemu::table3_machine(), measured_box());
+  for (std::size_t i = 0; i < 20; ++i) points.push_back(points[7 * i]);
+  for (std::size_t i = 0, j = points.size() - 1; i < j; ++i, --j)
+    std::swap(points[i].measured_m, points[j].measured_m);
+  const auto wrong = observe(points);
+  ASSERT_FALSE(wrong);
+  EXPECT_THAT(wrong.error().text, testing::HasSubstr("the measured points in the opposite order"));
+}
+
 TEST(Verification, RefusesMixedUpRowsAndMirroredFrames) {
   auto points = measured(tests::evemu::table3_machine(), measured_box());
   auto mirrored = points;

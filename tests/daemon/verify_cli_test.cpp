@@ -267,6 +267,10 @@ TEST_F(VerifyCli, RefusesModelsOfDifferentMachines) {
     EXPECT_THAT(meant.out, HasSubstr("different machines: a.json is of machine")) << command;
     EXPECT_THAT(abbe(command + " --other-machine --json").out, HasSubstr("another mill"));
   }
+  const auto several = nlohmann::json::parse(
+      abbe("verify a.json b.json --points points.csv --other-machine --json").out);
+  EXPECT_THAT(several.at("different_machines").get<std::string>(), HasSubstr("b.json of "));
+  EXPECT_TRUE(several.at("repeatability_um").is_null()) << "one shot of each place";
 }
 
 std::string watched_portal() {
@@ -328,9 +332,10 @@ TEST_F(VerifyCli, RefusesARecordingOfAnotherMachine) {
   record_standstills(folder_, tracker_points(study::table3_machine()));
   const auto document = test::synthetic_document(3);
   write("tables.json", to_json(document));
-  const auto refused = abbe("verify tables.json --recording run.mcap");
+  const auto refused = abbe("verify tables.json --recording run.mcap -o kept");
   EXPECT_EQ(refused.exit, 2);
   EXPECT_THAT(refused.err, HasSubstr("run.mcap of \"weak portal\""));
+  EXPECT_FALSE(fs::exists(folder_ / "kept"));
 }
 
 TEST_F(VerifyCli, ADamagedRecordingShowsItsResultAndEndsWithOne) {

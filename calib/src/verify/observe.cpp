@@ -23,20 +23,21 @@ Result<void> check_finite(std::span<const MeasuredPoint> points) {
 
 /// Text "; they fit with ..." that names the mistakes after whose correction the points fit the
 /// readings: a reflection, another unit, reversed order of the rows. Empty if no tested correction
-/// makes them fit.
-std::string fits_with(const Observations& o, double most_rms_m) {
+/// makes them fit. It tests the shots: means of places mix rows that are in the wrong order.
+std::string fits_with(std::span<const MeasuredPoint> points, double most_rms_m) {
   const auto fits = [&](const Matrix3& M, bool backwards) {
-    std::vector<Vector3> from;
-    for (const Vector3& p : o.measured_m) {
-      from.emplace_back(M * p);
+    std::vector<Vector3> from, readings_m;
+    for (const MeasuredPoint& p : points) {
+      from.emplace_back(M * p.measured_m);
+      readings_m.push_back(p.reading_m);
     }
     if (backwards) {
       std::reverse(from.begin(), from.end());
     }
-    const auto T = fit_rigid(from, o.readings_m);
+    const auto T = fit_rigid(from, readings_m);
     std::vector<Vector3> left;
     for (std::size_t i = 0; T && i < from.size(); ++i) {
-      left.emplace_back(*T * from[i] - o.readings_m[i]);
+      left.emplace_back(*T * from[i] - readings_m[i]);
     }
     return T && vector_statistics(left).rms_m <= most_rms_m;
   };
@@ -66,7 +67,8 @@ std::string fits_with(const Observations& o, double most_rms_m) {
   return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
-Result<void> check_lack_of_fit(const Observations& o, const Extent& extent) {
+Result<void> check_lack_of_fit(const Observations& o, std::span<const MeasuredPoint> points,
+                               const Extent& extent) {
   Vector3 mean = Vector3::Zero();
   for (const Vector3& v : o.V_m) {
     mean += v / static_cast<double>(o.V_m.size());
@@ -85,7 +87,7 @@ Result<void> check_lack_of_fit(const Observations& o, const Extent& extent) {
                            o.frame == Frame::BestFit ? " after the best rigid motion"
                                                      : " in the machine's axes",
                            ": rows in the wrong order, another unit, or a left-handed frame",
-                           fits_with(o, kMostLackOfFit * extent.diagonal_m())));
+                           fits_with(points, kMostLackOfFit * extent.diagonal_m())));
   }
 
   return {};
@@ -193,7 +195,7 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
   }
   o.repeatability_m = repeatability_m(points, o);
 
-  if (auto fits = check_lack_of_fit(o, *extent); !fits) {
+  if (auto fits = check_lack_of_fit(o, points, *extent); !fits) {
     return tl::make_unexpected(fits.error());
   }
 

@@ -81,7 +81,7 @@ void add_left(HtmlReport& page, const Verification& v) {
                        {"with the model", lengths_um(c.residual_after_m)}}});
 }
 
-/// "line 9", "lines 9, 12, 40 (3 shots)".
+/// "line 9", "lines 9, 12, 40", "lines 9, 12, 40, 41 ... (7 shots)".
 std::string place_text(const Verification& v, std::size_t place) {
   constexpr std::size_t kShown = 4;
   const auto& shots = v.observations.shots[place];

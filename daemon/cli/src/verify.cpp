@@ -118,8 +118,8 @@ Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMac
   if (!arguments.recording.empty()) {
     auto points = points_of_recording(arguments.recording);
     if (!points) return points;
-    if (auto done = keep_them(points->file); !done) return tl::make_unexpected(done.error());
     if (auto done = accept(points->machine); !done) return tl::make_unexpected(done.error());
+    if (auto done = keep_them(points->file); !done) return tl::make_unexpected(done.error());
     return points;
   }
 
@@ -260,8 +260,7 @@ void print_json(const VerifyOutcome& outcome) {
       {"points", o.shot_count()},
       {"places", o.shots.size()},
       {"inside", c.inside.size()},
-      {"repeatability_um",
-       o.repeatability_m ? nlohmann::json(kUmPerM * *o.repeatability_m) : nlohmann::json()},
+      {"repeatability_um", repeatability_figure(o)},
       {"before", vector_figures(c.before)},
       {"after", vector_figures(c.after)},
       {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},

@@ -62,10 +62,13 @@ Result<std::vector<Predicted>> predictions(const std::vector<NamedModel>& models
 }
 
 void print_predictions_json(const std::vector<Predicted>& all, const verify::Observations& observed,
-                            const verify::Observations& common) {
+                            const verify::Observations& common,
+                            const std::string& different_machines) {
   nlohmann::json object{{"points", observed.shot_count()},
                         {"places", observed.shots.size()},
                         {"inside_all", common.shots.size()},
+                        {"repeatability_um", repeatability_figure(observed)},
+                        {"different_machines", different_machines},
                         {"models", nlohmann::json::array()}};
   for (const auto& [model, at_points] : all)
     object["models"].push_back({{"name", model->name},
@@ -133,7 +136,7 @@ Result<int> verify_several(const std::vector<NamedModel>& models,
   const auto all = predictions(models, common);
   if (!all) return tl::make_unexpected(all.error());
   if (options.json) {
-    print_predictions_json(*all, observed, common);
+    print_predictions_json(*all, observed, common, options.different_machines);
   } else {
     if (!options.different_machines.empty()) fmt::print("{}\n", options.different_machines);
     print_predictions(*all, observed, common);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <optional>
 #include <random>
 
 #include "abbe/calib/mfb/plan_prediction.hpp"
@@ -184,6 +185,39 @@ TEST(MfbIdentify, CorrectsTheExpansionOfTheBar) {
   steel.alpha_error_per_K = 0.7e-6;  // 1.4 u: covered by the uncertainty of alpha
   EXPECT_NEAR(chi2_per_dof(steel, [](Bar&, Plan& p) { p.noise.u_temperature_K = 0.05; }), 1.0,
               0.25);
+}
+
+/// Standard uncertainty of EXX at the last node, whose reference is at the first one.
+double u_of_travel_m(double u_K, std::optional<double> u_common_K) {
+  std::mt19937_64 random(62);
+  const SimulatedMachine machine(random);
+  Plan plan = paper_plan();
+  const ProbedBar probed =
+      probe(machine, plan, random, {.expansion = Expansivity{11e-6, 0.0}, .warmer_K = 1.0});
+  for (Measurement& m : plan.measurements) {
+    m.temperature_K = kReferenceTemperature_K + 1.0;
+  }
+  plan.noise.u_temperature_K = u_K;
+  plan.noise.u_common_temperature_K = u_common_K;
+  Options wide;
+  wide.solve.most_u_m = 50e-6;
+  const auto found = identify(probed.bar, plan, probed.touches, paper_machine(), wide);
+  EXPECT_TRUE(found) << found.error().text;
+  const ParameterLayout& layout = found->observations.basis.layout();
+  const auto table = *layout.find({Motion::X, Axis::X});
+  const auto at = static_cast<Eigen::Index>(table.offset);
+  const auto last = at + static_cast<Eigen::Index>(layout.node_count(Axis::X)) - 1;
+  const Eigen::MatrixXd& C = found->solution.covariance;
+  return std::sqrt(C(at, at) + C(last, last) - 2.0 * C(at, last));
+}
+
+/// A thermometer that is wrong is wrong at every position: more positions do not help.
+TEST(MfbIdentify, TheErrorOfTheThermometerIsCommonToAllPositions) {
+  const std::vector<double>& nodes_m = paper_machine().nodes[0].nodes_m;
+  const double common_m = 11e-6 * 0.3 * (nodes_m.back() - nodes_m.front());
+  EXPECT_GT(u_of_travel_m(0.3, std::nullopt), common_m);
+  EXPECT_NEAR(u_of_travel_m(0.0, 0.3), common_m, 0.3 * common_m);
+  EXPECT_LT(u_of_travel_m(0.3, 0.0), 0.9 * u_of_travel_m(0.3, std::nullopt));
 }
 
 TEST(MfbIdentify, CorrectsTheSagOfTheBar) {

@@ -33,7 +33,9 @@ VarianceParts variance_parts(const JointSystem& system, const SharedEstimate& es
       shared, estimate.covariance.middleCols(shared.bar_offset(), shared.bar_root().cols()));
   parts.expansion =
       squares_of(shared, estimate.covariance.middleCols(shared.alpha_offset(), shared.alphas()));
-  parts.temperature = parts.roll = parts.drift = Eigen::VectorXd::Zero(parts.total.size());
+  parts.temperature = squares_of(
+      shared, estimate.covariance.middleCols(shared.temperature_offset(), shared.temperatures()));
+  parts.roll = parts.drift = Eigen::VectorXd::Zero(parts.total.size());
   for (const PositionSystem& s : system.positions) {
     parts.roll += squares_of(
         shared, covariance_with_nuisance(s, estimate, kRollUnknown) / s.layout.u[kRollUnknown]);

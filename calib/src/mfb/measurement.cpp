@@ -49,7 +49,8 @@ Result<void> check_noise(const Plan& plan, const Bar& bar) {
         ErrorCode::BadInput,
         "plan: the noise of probe and machine must not be negative, one of them positive");
   }
-  if (!std::isfinite(n.u_temperature_K) || n.u_temperature_K < 0.0) {
+  if (!std::isfinite(n.u_temperature_K) || n.u_temperature_K < 0.0 ||
+      !std::isfinite(n.common_temperature_K()) || n.common_temperature_K() < 0.0) {
     return failure(ErrorCode::BadInput,
                    "plan: the uncertainty of the temperature must not be negative");
   }

@@ -104,8 +104,11 @@ Trials::BarErrors Trials::drawn_errors() {
   }
   errors.calibration_m = shared_.bar_root() * g;
   errors.alpha_per_K = shared_.u_alpha_per_K() * random_.next();
+  const TouchNoise& noise = o_.plan.noise;
+  const double common_K =
+      noise.common_temperature_K() > 0.0 ? noise.common_temperature_K() * random_.next() : 0.0;
   for (std::size_t i = 0; i < o_.positions.size(); ++i) {
-    errors.temperature_K.push_back(o_.plan.noise.u_temperature_K * random_.next());
+    errors.temperature_K.push_back(common_K + noise.u_temperature_K * random_.next());
   }
   return errors;
 }

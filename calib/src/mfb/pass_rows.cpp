@@ -143,6 +143,12 @@ RowMajorRows shared_rows(const Observations& o, const PassObservation& pass,
           warmer_K * shared.u_alpha_per_K() * o.bar.O_m[i];
     }
   }
+  if (shared.temperatures() > 0) {
+    for (std::size_t i = 0; i < o.bar.O_m.size(); ++i) {
+      rows.block<3, 1>(3 * static_cast<Eigen::Index>(i), shared.temperature_offset()) =
+          shared.growth_of_temperature() * o.bar.O_m[i];
+    }
+  }
   return rows;
 }
 

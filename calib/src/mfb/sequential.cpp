@@ -35,7 +35,7 @@ Result<Eigen::MatrixXd> root_of_result(const Observations& o, const Sequence& se
   const Eigen::Index n = sequence.U().rows(), bar = shared.bar_root().cols();
   const Eigen::Index positions = std::ssize(o.positions);
   Eigen::MatrixXd of_noise(n, rows * std::ssize(sequence.profiles()));
-  Eigen::MatrixXd of_others = Eigen::MatrixXd::Zero(n, bar + 1 + positions);
+  Eigen::MatrixXd of_others = Eigen::MatrixXd::Zero(n, bar + 2 + positions);
 
   for (std::size_t m = 0; m < sequence.profiles().size(); ++m) {
     const Profile& p = sequence.profiles()[m];
@@ -54,7 +54,8 @@ Result<Eigen::MatrixXd> root_of_result(const Observations& o, const Sequence& se
     const double alpha_per_K = o.bar.expansion ? o.bar.expansion->alpha_per_K : 0.0;
     of_others.col(bar) +=
         (pass.temperature_K - kReferenceTemperature_K) * shared.u_alpha_per_K() * (S * O);
-    of_others.col(bar + 1 + static_cast<Eigen::Index>(pass.position)) +=
+    of_others.col(bar + 1) += shared.growth_of_temperature() * (S * O);
+    of_others.col(bar + 2 + static_cast<Eigen::Index>(pass.position)) +=
         alpha_per_K * o.plan.noise.u_temperature_K * (S * O);
   }
 

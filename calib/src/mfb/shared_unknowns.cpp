@@ -25,8 +25,11 @@ SharedUnknowns::SharedUnknowns(const Observations& o)
     : of_parameter_(o.basis.size()),
       is_free_(o.basis.size(), false),
       bar_root_(root_of_covariance(o.bar.covariance_m2)),
-      u_alpha_per_K_(o.bar.expansion ? o.bar.expansion->u_alpha_per_K : 0.0) {
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, o.basis, o.basis.size());
+      u_alpha_per_K_(o.bar.expansion ? o.bar.expansion->u_alpha_per_K : 0.0),
+      growth_of_temperature_(o.bar.expansion ? std::abs(o.bar.expansion->alpha_per_K) *
+                                                   o.plan.noise.common_temperature_K()
+                                             : 0.0) {
+  const Eigen::MatrixXd K = gauge_conditions(Gauge::G2, o.basis, o.basis.size());
   std::vector<Eigen::Index> condition_of(o.basis.size(), -1);
   for (Eigen::Index row = 0; row < K.rows(); ++row) {
     Eigen::Index pivot = 0;

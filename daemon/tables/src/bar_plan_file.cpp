@@ -131,6 +131,10 @@ void read_head(Section head, const Bar& bar, Plan& out) {
     head.fault("tip_radius_mm", fmt::format("{} does not fit into holes of radius {} mm",
                                             out.tip_radius_m * kMmPerM, hole_m * kMmPerM));
   head.get("u_temperature_K", out.noise.u_temperature_K, kPlain, {0.0, 50.0});
+  double common_K = 0.0;
+  if (head.has("u_common_temperature_K") &&
+      head.get("u_common_temperature_K", common_K, kPlain, {0.0, 50.0}))
+    out.noise.u_common_temperature_K = common_K;
   get_direction(head, "gravity", out.gravity);
   head.close();
 }

@@ -93,6 +93,10 @@ std::string settings(const calib::mfb::Plan& plan, bool expands) {
   if (expands)
     text += fmt::format("u_temperature_K = {}    # of temperature_C, once per position\n",
                         number(plan.noise.u_temperature_K, 9));
+  if (expands && plan.noise.u_common_temperature_K)
+    text +=
+        fmt::format("u_common_temperature_K = {}    # of the thermometer, at all positions alike\n",
+                    number(*plan.noise.u_common_temperature_K, 9));
   if (plan.gravity != calib::Vector3(-calib::Vector3::UnitZ()))
     text += fmt::format("gravity = {}\n", direction(plan.gravity));
   return text + fmt::format(

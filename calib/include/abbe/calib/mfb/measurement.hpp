@@ -40,6 +40,14 @@ struct TouchNoise {
   double probe_m = 0.0;          ///< of one touch along the normal of the surface
   double machine_m = 0.0;        ///< of one touch in each machine axis (repeatability)
   double u_temperature_K = 0.0;  ///< of temperature_K, one error per position
+  /// Of temperature_K, one error common to all positions: that of the thermometer. Unless stated it
+  /// is u_temperature_K: a thermometer that is wrong is wrong at every position, and all lengths are
+  /// wrong alike.
+  std::optional<double> u_common_temperature_K{};
+
+  [[nodiscard]] double common_temperature_K() const {
+    return u_common_temperature_K.value_or(u_temperature_K);
+  }
 };
 
 struct Plan {

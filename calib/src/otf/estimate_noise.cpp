@@ -339,8 +339,9 @@ RowMatrix without(const Observations& o, std::span<const double> residual_m,
 Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const double> residual_m,
                                     const Options& options) {
   // Slope of log |A^T V^-1 A| and U are those at the end of the round before: where the rounds no
-  // longer change x, the slope of -2 log of the restricted likelihood is zero.
-  constexpr int kMostRounds = 4;
+  // longer change x, the slope of -2 log of the restricted likelihood is zero. After the second round
+  // the slope hardly changes, and only U is computed again.
+  constexpr int kMostRounds = 4, kRoundsWithSlope = 2;
   constexpr double kStep = 0.1;  // of a logarithm
   // Square of a third of the standard deviation of x; the next round would change x by less than a
   // tenth of that.
@@ -361,6 +362,7 @@ Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const doubl
                              freedom(groups.rows.size()));
   Likelihood likelihood(series, scales, residual, freedom(o.rows.size()));
   Scored best = minimised(likelihood, bounds, start(of_groups, bounds));
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(best.x.size());
 
   for (int round = 0; round < kMostRounds; ++round) {
     if (Result<void> running = check_stopped(options.stopped); !running) {
@@ -368,8 +370,7 @@ Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const doubl
     }
     const double white_factor = best.value.white_factor;
     const AboutUnknowns::Fit at = unknowns.fit(scales.noise(best.x), white_factor);
-    Eigen::VectorXd slope(best.x.size());
-    for (Eigen::Index k = 0; k < slope.size(); ++k) {
+    for (Eigen::Index k = 0; round < kRoundsWithSlope && k < slope.size(); ++k) {
       Parameters moved = best.x;
       moved(k) += kStep;
       slope(k) =

@@ -72,11 +72,14 @@ WhitenedRows::WhitenedRows(const Observations& o, const TrackerNoise& noise)
   }
   apply(A);
 
+  // The prediction from earlier rows decreases with their age, and so do the entries of their nodes.
+  constexpr double kNegligible = 1e-10;
   std::vector<SparseRows::Entry> row;
   for (Eigen::Index i = 0; i < A.rows(); ++i) {
     row.clear();
+    const double least = kNegligible * A.row(i).cwiseAbs().maxCoeff();
     for (Eigen::Index j = 0; j < A.cols(); ++j) {
-      if (A(i, j) != 0.0) {
+      if (std::abs(A(i, j)) > least) {
         row.push_back({static_cast<std::size_t>(j), A(i, j)});
       }
     }

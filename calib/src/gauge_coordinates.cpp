@@ -58,7 +58,7 @@ bool is_in_gauge(const GaugeCoordinates& c, const Eigen::MatrixXd& covariance) {
 }
 
 GaugeCoordinates gauge_coordinates(const estimation::TableBasis& basis) {
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, basis, basis.size());
+  const Eigen::MatrixXd K = gauge_conditions(Gauge::G2, basis, basis.size());
   GaugeCoordinates c{.N = {}, .groups = groups_of(basis.layout())};
   std::vector<Eigen::MatrixXd> parts;
   Eigen::Index size = 0;

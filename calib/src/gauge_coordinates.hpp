@@ -1,5 +1,5 @@
 #pragma once
-/// Coordinates of the models of one layout in gauge G1, free of its conditions:
+/// Coordinates of the models of one layout in gauge G2, free of its conditions:
 ///     U = N e,   K N = 0,   N^T N = I
 /// Every column of N belongs to one table, or to one squareness error. The covariance of e is
 /// regular where that of U, with its conditions, is singular.

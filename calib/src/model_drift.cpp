@@ -309,8 +309,8 @@ Result<void> check_same_parameters(const VolumetricModel& a, const VolumetricMod
   if (a.tables() == nullptr || b.tables() == nullptr) {
     return not_comparable("one of them is a polynomial model, not one of tables");
   }
-  if (a.gauge() != Gauge::G1 || b.gauge() != Gauge::G1) {
-    return not_comparable("one of them is not in gauge G1");
+  if (!is_of_tables(a.gauge()) || !is_of_tables(b.gauge())) {
+    return not_comparable("one of them is not in gauge G1 or G2");
   }
 
   if (a.chain().order_w_to_t() != b.chain().order_w_to_t() ||

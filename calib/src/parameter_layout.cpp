@@ -74,6 +74,7 @@ Result<ParameterLayout> ParameterLayout::with_tables(const KinematicChain& chain
   ParameterLayout layout;
   layout.chain_ = chain;
   layout.nodes_ = std::move(nodes);
+  layout.squareness_from_m_ = reference_position_m(layout.nodes_);
 
   const auto is_wanted = [&](ErrorMotion e) {
     return std::find(wanted.begin(), wanted.end(), e) != wanted.end();
@@ -89,6 +90,12 @@ Result<ParameterLayout> ParameterLayout::with_tables(const KinematicChain& chain
                                                 layout.tables_.size(), " of them distinct"));
   }
 
+  return layout;
+}
+
+ParameterLayout ParameterLayout::with_squareness_from(const Vector3& axis_position_m) const {
+  ParameterLayout layout = *this;
+  layout.squareness_from_m_ = axis_position_m;
   return layout;
 }
 

@@ -48,7 +48,7 @@ DesignColumns design_columns(const ParameterLayout& layout, const Vector3& axis_
   }
 
   std::size_t parameter = layout.squareness_offset();
-  for (const Vector3& c : squareness_effects(axis_position_m)) {
+  for (const Vector3& c : squareness_effects(axis_position_m - layout.squareness_from_m())) {
     push(columns, parameter++, c);
   }
 
@@ -81,7 +81,7 @@ Vector3 volumetric_error(const ParameterLayout& layout, std::span<const double> 
   }
 
   std::size_t parameter = layout.squareness_offset();
-  for (const Vector3& c : squareness_effects(axis_position_m)) {
+  for (const Vector3& c : squareness_effects(axis_position_m - layout.squareness_from_m())) {
     V += c * U[parameter++];
   }
 

@@ -146,8 +146,11 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   }
 
   const bool cubic = interpolation != estimation::Interpolation::Linear;
+  const Vector3 squareness_from_m =
+      gauge == Gauge::G1 ? Vector3(Vector3::Zero()) : reference_position_m(layout.nodes());
   Result<estimation::TableBasis> basis =
-      estimation::TableBasis::of(layout, estimation::TableOptions::all_axes(interpolation));
+      estimation::TableBasis::of(layout.with_squareness_from(squareness_from_m),
+                                 estimation::TableOptions::all_axes(interpolation));
   if (!basis) {
     return tl::unexpected(basis.error());
   }
@@ -177,9 +180,9 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel mode
     return failure(ErrorCode::NotFinite, "model: the tool offset is not a number");
   }
 
-  if (gauge == Gauge::G1) {
-    return failure(ErrorCode::BadInput,
-                   "model: gauge G1 is for tables; polynomials need gauge Ball1");
+  if (is_of_tables(gauge)) {
+    return failure(ErrorCode::BadInput, message("model: gauge ", name(gauge),
+                                                " is for tables; polynomials need gauge Ball1"));
   }
 
   MachineNodes nodes = grid_over(validity);

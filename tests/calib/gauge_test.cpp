@@ -213,4 +213,53 @@ TEST(GaugeG1, LeavesTheReferenceTablesAsTheyAre) {
   EXPECT_LT((gauge_conditions(Gauge::G1, layout) * U).cwiseAbs().maxCoeff(), 1e-15);
 }
 
+/// A machine whose axes are far from machine zero.
+otf::Machine machine_far_from_zero() {
+  otf::Machine machine = coarse_machine("[w X' b Y Z t]");
+  for (AxisNodes& axis : machine.nodes) {
+    axis = *equidistant_nodes(2.8, 3.2, 0.1);
+    axis.reference_m = 3.0;
+  }
+  return machine;
+}
+
+VolumetricModel model_in(Gauge gauge, const otf::Machine& machine, const Eigen::VectorXd& U) {
+  const ParameterLayout layout = layout_of(machine);
+  return *VolumetricModel::from_vector(layout, gauge, std::array{machine.target_offset_m}, U,
+                                       1e-14 * Eigen::MatrixXd::Identity(U.size(), U.size()),
+                                       *ValidityVolume::hull_of(tensor_grid(machine.nodes)));
+}
+
+TEST(GaugeG2, SquarenessActsOnTheDistanceFromTheReferencePosition) {
+  const otf::Machine machine = machine_far_from_zero();
+  const ParameterLayout layout = layout_of(machine);
+  Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.model_size()));
+  U.tail<3>() = Vector3(20e-6, -30e-6, 40e-6);
+  const VolumetricModel G1 = model_in(Gauge::G1, machine, U), G2 = model_in(Gauge::G2, machine, U);
+  const Vector3 reference_m = Vector3::Constant(3.0), t = machine.target_offset_m;
+  EXPECT_EQ(G2.V_at(reference_m, t), Vector3(Vector3::Zero()));
+  EXPECT_LT(std::sqrt(G2.error_at(reference_m, t).cov_V_m2.trace()), 1e-6);
+
+  const Vector3 constant_m = G1.V_at(reference_m, t);
+  EXPECT_NEAR(constant_m.x(), -40e-6 * 3.0 - 30e-6 * 3.0, 1e-15);
+  EXPECT_NEAR(constant_m.y(), -20e-6 * 3.0, 1e-15);
+  for (const Vector3& q : tensor_grid(machine.nodes)) {
+    EXPECT_LT((G1.V_at(q, t) - G2.V_at(q, t) - constant_m).norm(), 1e-15);
+  }
+}
+
+TEST(GaugeG2, AStoredModelKeepsItsGauge) {
+  const otf::Machine machine = machine_far_from_zero();
+  const ParameterLayout layout = layout_of(machine);
+  const Eigen::VectorXd U =
+      Eigen::VectorXd::Constant(static_cast<Eigen::Index>(layout.model_size()), 1e-5);
+  const Vector3 q_m(2.9, 3.1, 3.0);
+  for (const Gauge gauge : {Gauge::G1, Gauge::G2}) {
+    const VolumetricModel model = model_in(gauge, machine, U);
+    const VolumetricModel read = *VolumetricModel::from_description(model.description());
+    EXPECT_EQ(read.gauge(), gauge);
+    EXPECT_EQ(read.V_at(q_m, machine.target_offset_m), model.V_at(q_m, machine.target_offset_m));
+  }
+}
+
 }  // namespace

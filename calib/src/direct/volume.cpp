@@ -20,7 +20,7 @@ Result<VolumetricModel> model_of(const ParameterLayout& layout, const TableValue
     return tl::make_unexpected(validity.error());
   }
   const Eigen::MatrixXd symmetric = 0.5 * (values.cov_U + values.cov_U.transpose());
-  return VolumetricModel::from_vector(layout, Gauge::G1, like.tool_offsets_m().first(1), values.U,
+  return VolumetricModel::from_vector(layout, Gauge::G2, like.tool_offsets_m().first(1), values.U,
                                       symmetric, std::move(*validity));
 }
 

@@ -75,7 +75,7 @@ void append_cell_columns(const TableBasis& basis, const MachineState& state,
   }
 
   std::size_t parameter = 2 * layout.squareness_offset();
-  for (const Vector3& c : squareness_effects(state.q_m)) {
+  for (const Vector3& c : squareness_effects(state.q_m - layout.squareness_from_m())) {
     columns.push(parameter++, c);
   }
 }

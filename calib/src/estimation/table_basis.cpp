@@ -81,7 +81,7 @@ void TableBasis::append_columns(const MachineState& state, ModelColumns& columns
   }
 
   std::size_t parameter = layout_.squareness_offset();
-  for (const Vector3& c : squareness_effects(state.q_m)) {
+  for (const Vector3& c : squareness_effects(state.q_m - layout_.squareness_from_m())) {
     columns.push(parameter++, c);
   }
 
@@ -129,7 +129,7 @@ Vector3 TableBasis::V_m(const MachineState& state, std::span<const double> U) co
   }
 
   std::size_t parameter = layout_.squareness_offset();
-  for (const Vector3& c : squareness_effects(state.q_m)) {
+  for (const Vector3& c : squareness_effects(state.q_m - layout_.squareness_from_m())) {
     V += c * U[parameter++];
   }
 

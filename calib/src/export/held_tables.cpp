@@ -187,6 +187,7 @@ Result<HeldTables> tables_of_model(const VolumetricModel& model, const Vector3& 
 
   const std::span<const double> U(model.U().data(), static_cast<std::size_t>(model.U().size()));
   const auto squareness = U.subspan(basis->layout().squareness_offset(), 3);
+  const Vector3& squareness_from_m = basis->layout().squareness_from_m();
   HeldTables held{model.chain(), tool_m, nodes_m, {}};
   for (const Axis axis : kAllAxes) {
     for (const Motion kind : kAllMotions) {
@@ -194,7 +195,8 @@ Result<HeldTables> tables_of_model(const VolumetricModel& model, const Vector3& 
       HeldTable table{motion, {}, {}};
       for (const double q : nodes_m[index(axis)]) {
         table.value.push_back(-model_table_at(*basis, U, motion, q) -
-                              squareness_slope(motion, squareness) * q);
+                              squareness_slope(motion, squareness) *
+                                  (q - squareness_from_m(static_cast<Eigen::Index>(index(axis)))));
       }
       held.tables.push_back(std::move(table));
     }

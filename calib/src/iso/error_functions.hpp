@@ -30,6 +30,10 @@ class ErrorFunctions {
   /// A difference between the directions of travel that has an effect in `rows` is not determined by
   /// the measurement: only its prior is known.
   [[nodiscard]] bool has_undetermined_travel(const Eigen::MatrixXd& rows) const;
+  /// Variance of each row times U.
+  [[nodiscard]] Eigen::VectorXd variances(const Eigen::MatrixXd& rows) const {
+    return (rows * covariance_).cwiseProduct(rows).rowwise().sum();
+  }
   /// Errors of the parameters as their covariance has them: parameters x draws. The opposite of each
   /// is as probable.
   [[nodiscard]] const Eigen::MatrixXd& drawn_errors() const { return drawn_errors_; }

@@ -1,3 +1,4 @@
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -54,6 +55,37 @@ double u_of_largest(const ErrorFunctions& functions, const LineBox& box, const V
   });
 }
 
+/// Mean and largest U(V) over a lattice without the rigid motion that fits best to it.
+struct UOfShape {
+  double mean_m = 0.0, max_m = 0.0;
+};
+UOfShape u_of_shape(const ErrorFunctions& functions, const LineBox& box, const Vector3& tool_m) {
+  constexpr int kPerSide = 6;
+  const std::vector<Vector3> lattice_m = lattice_of(box, kPerSide);
+  const Eigen::Index n = std::ssize(lattice_m);
+  Eigen::MatrixXd rows(3 * n, functions.drawn_errors().rows()), rigid(3 * n, 6);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vector3& q_m = lattice_m[static_cast<std::size_t>(i)];
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      rows.row(3 * i + k) = functions.row(q_m, Vector3::Unit(k));
+    }
+    rigid.block<3, 3>(3 * i, 0).setIdentity();
+    rigid.block<3, 3>(3 * i, 3) = rotation_effect(q_m + tool_m);
+  }
+  const Eigen::MatrixXd motions =
+      rigid.householderQr().householderQ() * Eigen::MatrixXd::Identity(3 * n, 6);
+  rows -= motions * (motions.transpose() * rows);
+
+  const Eigen::VectorXd variance_m2 = functions.variances(rows);
+  UOfShape u;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double U_m = 2.0 * std::sqrt(std::max(0.0, variance_m2.segment<3>(3 * i).sum()));
+    u.mean_m += U_m / static_cast<double>(n);
+    u.max_m = std::max(u.max_m, U_m);
+  }
+  return u;
+}
+
 }  // namespace
 
 Result<VolumeError> volume_error(const VolumetricModel& model) {
@@ -83,7 +115,11 @@ Result<VolumeError> volume_error(const VolumetricModel& model) {
     }
   }
 
-  e.largest.u = u_of_largest(ErrorFunctions(model), *box, largest, e.largest.u);
+  const ErrorFunctions functions(model);
+  e.largest.u = u_of_largest(functions, *box, largest, e.largest.u);
+  const UOfShape of_shape = u_of_shape(functions, *box, tool_m);
+  e.rigid_free_mean_U_m = of_shape.mean_m;
+  e.rigid_free_max_U_m = of_shape.max_m;
   const Result<ModelDifference> statistics = rigid_free(points_m, V_m);
   if (!statistics) {
     return tl::unexpected(statistics.error());

@@ -181,7 +181,7 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
   const Eigen::MatrixXd of_e = solved->covariance.topLeftCorner(m, m);
   const Eigen::MatrixXd C = c.N * of_e * c.N.transpose();
   Result<VolumetricModel> model =
-      VolumetricModel::from_vector(common.basis, Gauge::G1, std::array{common.tool_offset_m}, U,
+      VolumetricModel::from_vector(common.basis, Gauge::G2, std::array{common.tool_offset_m}, U,
                                    0.5 * (C + C.transpose()), *std::move(validity));
   if (!model) {
     return tl::unexpected(model.error());

@@ -57,7 +57,7 @@ Result<Eigen::MatrixXd> LeftOutRotations::of_parameters() const {
     return Eigen::MatrixXd(model, 0);
   }
 
-  const estimation::Datum gauge(gauge_conditions(Gauge::G1, common_.basis, layout.fit_size()));
+  const estimation::Datum gauge(gauge_conditions(Gauge::G2, common_.basis, layout.fit_size()));
   const Eigen::MatrixXd free = unobservable_combinations(layout, std::array{common_.tool_offset_m});
   return gauge.transformation(free).map(
       [&](const Eigen::MatrixXd& S) { return Eigen::MatrixXd((S * effect).topRows(model)); });

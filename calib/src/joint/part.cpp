@@ -15,8 +15,8 @@ Result<CommonTables> tables_of(const VolumetricModel& model) {
   if (tables == nullptr) {
     return not_applicable("has polynomials, must have tables");
   }
-  if (model.gauge() != Gauge::G1) {
-    return not_applicable("is not in gauge G1");
+  if (!is_of_tables(model.gauge())) {
+    return not_applicable("is not in gauge G1 or G2");
   }
   if (model.tool_offsets_m().size() != 1) {
     return not_applicable(

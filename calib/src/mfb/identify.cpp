@@ -111,7 +111,7 @@ std::vector<Vector3> tools_of(const Plan& plan) {
 
 Result<VolumetricModel> model_of(const Observations& o, const Solution& solution) {
   return touched_box(o).and_then([&](ValidityVolume volume) {
-    return VolumetricModel::from_vector(o.basis, Gauge::G1, tools_of(o.plan), solution.U,
+    return VolumetricModel::from_vector(o.basis, Gauge::G2, tools_of(o.plan), solution.U,
                                         solution.covariance, std::move(volume));
   });
 }

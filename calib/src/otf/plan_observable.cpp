@@ -45,7 +45,7 @@ void clear_rows(Observations& o) {
   o.sub_points_m.clear();
 }
 
-/// The columns of `null_space`, in gauge G1. A combination that no run determines is zero there.
+/// The columns of `null_space`, in gauge G2. A combination that no run determines is zero there.
 Eigen::MatrixXd in_gauge(const Observations& o, const Eigen::MatrixXd& null_space) {
   // unobservable_combinations() has no rows for differences between directions of travel.
   const Eigen::MatrixXd of_layout =

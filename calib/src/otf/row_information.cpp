@@ -49,7 +49,7 @@ RowInformation information_of(const Observations& o,
 }
 
 estimation::Datum gauge_of(const Observations& o) {
-  return estimation::Datum(gauge_conditions(Gauge::G1, o.basis, o.unknowns()));
+  return estimation::Datum(gauge_conditions(Gauge::G2, o.basis, o.unknowns()));
 }
 
 std::size_t determined_by(const estimation::Information& data, const Eigen::MatrixXd& Q) {

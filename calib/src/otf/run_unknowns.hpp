@@ -56,10 +56,10 @@ class RunUnknowns {
   std::size_t model_ = 0, per_run_ = 0, runs_ = 0;
 };
 
-/// The conditions of gauge G1 for `unknowns` unknowns, of which the first are those of the basis.
+/// The conditions of gauge G2 for `unknowns` unknowns, of which the first are those of the basis.
 [[nodiscard]] inline estimation::Datum gauge_of_runs(const estimation::TableBasis& basis,
                                                      std::size_t unknowns) {
-  return estimation::Datum(gauge_conditions(Gauge::G1, basis, unknowns));
+  return estimation::Datum(gauge_conditions(Gauge::G2, basis, unknowns));
 }
 
 }  // namespace abbe::calib::otf

@@ -238,7 +238,7 @@ Result<TablesSoFar> RunningEstimate::tables() const {
       Eigen::VectorXd::Constant(static_cast<Eigen::Index>(data.unknowns()), kPrior);
   prior.segment<kRigidUnknowns>(rigid_at).setConstant(kRigidPrior);
 
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, basis_, data.unknowns());
+  const Eigen::MatrixXd K = gauge_conditions(Gauge::G2, basis_, data.unknowns());
   const estimation::Information in_gauge = with_gauge(data, K);
   const estimation::NullSpace unseen = estimation::null_space(in_gauge);
   const Estimate estimate = regular_estimate(in_gauge, prior);

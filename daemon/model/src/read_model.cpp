@@ -112,12 +112,13 @@ void read_covariance(ModelReader& in, calib::ModelDescription& out) {
 
 void read_gauge(ModelReader& in, calib::ModelDescription& out) {
   const auto text = in.text("gauge");
-  for (const auto gauge : {calib::Gauge::G1, calib::Gauge::Ball1Blocks, calib::Gauge::Ball1})
+  for (const auto gauge :
+       {calib::Gauge::G1, calib::Gauge::G2, calib::Gauge::Ball1Blocks, calib::Gauge::Ball1})
     if (text == name(gauge)) {
       out.gauge = gauge;
       return;
     }
-  in.fault("gauge", "must be \"G1\", \"Ball1-blocks\" or \"Ball1\"");
+  in.fault("gauge", "must be \"G1\", \"G2\", \"Ball1-blocks\" or \"Ball1\"");
 }
 
 calib::ModelDescription read_description(ModelReader& in) {

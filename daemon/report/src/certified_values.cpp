@@ -89,7 +89,11 @@ ValueGroup volume_group(const calib::iso::VolumeError& e) {
        without_u("V.rigid-free.max", "before, without rigid motion: largest", e.rigid_free_max_m,
                  e.max_U_m),
        without_u("U.mean", "after: U(V), mean", e.mean_U_m, e.max_U_m),
-       without_u("U.max", "after: U(V), largest", e.max_U_m, e.max_U_m)}};
+       without_u("U.max", "after: U(V), largest", e.max_U_m, e.max_U_m),
+       without_u("U.rigid-free.mean", "after: U(V) without rigid motion, mean",
+                 e.rigid_free_mean_U_m, e.rigid_free_max_U_m),
+       without_u("U.rigid-free.max", "after: U(V) without rigid motion, largest",
+                 e.rigid_free_max_U_m, e.rigid_free_max_U_m)}};
 }
 
 ValueGroup positioning_group(const calib::iso::StandardValues& standard, std::string_view why) {

@@ -45,9 +45,12 @@ std::string gauge_in_words(const calib::VolumetricModel& model) {
                     kMmPerM * model.tables()->layout().nodes()[index(axis)].reference_m));
   return fmt::format(
       "{}: positioning and angular errors are 0 at the reference position of their axis ({}), "
-      "straightness errors are 0 at the first and the last node. Another gauge describes the same "
-      "machine with other numbers; the values of the standards do not depend on it.",
-      name, fmt::join(references, ", "));
+      "straightness errors are 0 at the first and the last node; squareness errors act on the "
+      "distance from {}. Another gauge describes the same machine with other numbers; the values "
+      "of "
+      "the standards do not depend on it.",
+      name, fmt::join(references, ", "),
+      model.gauge() == calib::Gauge::G1 ? "machine zero" : "the reference position");
 }
 
 std::vector<std::string> signs_in_words() {

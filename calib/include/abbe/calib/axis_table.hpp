@@ -6,19 +6,23 @@
 
 #include "abbe/calib/basis.hpp"
 #include "abbe/calib/error_parameters.hpp"
+#include "abbe/calib/geometry.hpp"
 
 namespace abbe::calib {
 
 /// Range, nodes and reference of one linear axis.
 struct AxisNodes {
   std::vector<double> nodes_m;  ///< strictly ascending, both ends of the range included
-  /// positioning and rotation errors are zero at this position in gauge G1 (gauge.hpp); must be
+  /// positioning and rotation errors are zero at this position in gauge G2 (gauge.hpp); must be
   /// inside the range
   double reference_m = 0.0;
 };
 
 /// One entry each for X, Y, Z.
 using MachineNodes = std::array<AxisNodes, 3>;
+[[nodiscard]] inline Vector3 reference_position_m(const MachineNodes& nodes) {
+  return {nodes[0].reference_m, nodes[1].reference_m, nodes[2].reference_m};
+}
 
 /// Nodes from min to max with equal steps of at most `spacing_m` (default 0.05 m: the spacing of
 /// [Sanders 2023]). The reference is 0 if 0 is inside the range, else min. BadInput if min >= max

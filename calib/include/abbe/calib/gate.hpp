@@ -44,7 +44,7 @@ struct HeldOutFigures {
 };
 
 struct GateLimits {
-  /// Largest |V| in the volume. 1 mm: with a larger error the machine needs repair, or the path is
+  /// Largest |V| in the volume, without rigid motion. 1 mm: with a larger error the machine needs repair, or the path is
   /// wrong.
   double max_error_m = 1e-3;
   double max_gradient = 5e-3;  ///< |dV/dq| in m/m; 5 mm/m: 250 um between nodes 50 mm apart
@@ -87,7 +87,8 @@ struct Verdict {
   std::vector<std::string> causes;
   std::vector<std::string> notes;  ///< further information, no reason to refuse
   HeldOutFigures held_out;
-  double max_error_m = 0.0;   ///< of the candidate, at the points that decide() evaluates
+  /// |V| of the candidate without rigid motion, at the points that decide() evaluates
+  double max_error_m = 0.0;
   double max_gradient = 0.0;  ///< |dV/dq| along an axis, at these points
 
   /// Adds a reason: at the end, or before the reason with index `before`.

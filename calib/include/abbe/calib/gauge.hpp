@@ -9,7 +9,14 @@
 /// - positioning EXX, EYY, EZZ: 0 at the reference position of the axis,
 /// - straightness: 0 at the first and at the last node,
 /// - rotations: 0 at the reference position.
-/// Squareness and the rigid unknowns have no condition.
+/// Squareness and the rigid unknowns have no condition. Squareness errors act on the distance from
+/// machine zero.
+///
+/// Gauge G2 has the same conditions and the same parameters, but squareness errors act on the
+/// distance from the reference position: V at the reference position is then that of the
+/// straightness alone, wherever machine zero is. V in G1 and in G2 differ by a constant vector,
+///     V_G1 - V_G2 = (-EC0Y y + EB0Z z, -EA0Z z, 0) at the reference position (x, y, z).
+/// Every identification gives G2; models of earlier versions of abbe are in G1.
 ///
 /// A model from a ball array ([Li OMM]) has V = 0 at the centre of ball 1 (Ball1). The rotation of
 /// V about Ball1 is either that of the blocks of the artefact as the machine measured them (gauge
@@ -26,11 +33,13 @@
 
 namespace abbe::calib {
 
-enum class Gauge { G1, Ball1Blocks, Ball1 };
+enum class Gauge { G1, G2, Ball1Blocks, Ball1 };
 [[nodiscard]] constexpr std::string_view name(Gauge gauge) {
   switch (gauge) {
     case Gauge::G1:
       break;
+    case Gauge::G2:
+      return "G2";
     case Gauge::Ball1Blocks:
       return "Ball1-blocks";
     case Gauge::Ball1:
@@ -39,11 +48,16 @@ enum class Gauge { G1, Ball1Blocks, Ball1 };
   return "G1";
 }
 
-/// Matrix K of gauge G1 for tables: one row per condition, `unknowns` columns. The columns behind
+/// True for the gauges of tables.
+[[nodiscard]] constexpr bool is_of_tables(Gauge gauge) {
+  return gauge == Gauge::G1 || gauge == Gauge::G2;
+}
+
+/// Matrix K of gauges G1 and G2 for tables: one row per condition, `unknowns` columns. The columns behind
 /// those of the nodes are zero: squareness, differences between directions of travel, nuisances.
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const estimation::TableBasis&,
                                                std::size_t unknowns);
-/// Matrix K of gauge G1 for linear tables: one row per condition, fit_size() columns. The last six
+/// Matrix K of gauges G1 and G2 for linear tables: one row per condition, fit_size() columns. The last six
 /// columns belong to the rigid unknowns and are zero.
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout&);
 

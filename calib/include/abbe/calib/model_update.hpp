@@ -1,6 +1,6 @@
 #pragma once
 /// Continuous calibration: combines the model of a new run with the previous model of the machine,
-/// whose information is weakened for the time between them. Both are tables in gauge G1 with the
+/// whose information is weakened for the time between them. Both are tables in gauge G2 with the
 /// same parameters (check_same_parameters). In the coordinates e that the conditions of the gauge
 /// leave free, with G the part of the uncertainty that all runs have in common (UpdateOptions),
 ///     Cov_previous = (C_previous - G G^T) / forgetting + Q,   Cov_run = C_run - G G^T

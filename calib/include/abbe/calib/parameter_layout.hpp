@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "abbe/calib/axis_table.hpp"
+#include "abbe/calib/geometry.hpp"
 #include "abbe/calib/kinematic_chain.hpp"
 
 namespace abbe::calib {
@@ -38,6 +39,9 @@ class ParameterLayout {
   [[nodiscard]] static Result<ParameterLayout> with_tables(const KinematicChain&, MachineNodes,
                                                            std::span<const ErrorMotion>);
 
+  /// The same layout with squareness errors that act on the distance from this axis position.
+  [[nodiscard]] ParameterLayout with_squareness_from(const Vector3& axis_position_m) const;
+
   [[nodiscard]] const KinematicChain& chain() const { return chain_; }
   [[nodiscard]] const MachineNodes& nodes() const { return nodes_; }
   [[nodiscard]] std::span<const Table> tables() const { return tables_; }
@@ -45,6 +49,8 @@ class ParameterLayout {
   [[nodiscard]] std::size_t node_count(Axis a) const { return nodes_[index(a)].nodes_m.size(); }
 
   [[nodiscard]] std::size_t squareness_offset() const { return squareness_offset_; }
+  /// Axis position from which squareness errors act; the reference position unless set otherwise.
+  [[nodiscard]] const Vector3& squareness_from_m() const { return squareness_from_m_; }
   /// Number of parameters without the rigid unknowns.
   [[nodiscard]] std::size_t model_size() const { return squareness_offset_ + 3; }
   [[nodiscard]] std::size_t rigid_offset() const { return model_size(); }
@@ -60,6 +66,7 @@ class ParameterLayout {
   MachineNodes nodes_;
   std::vector<Table> tables_;
   std::size_t squareness_offset_ = 0;
+  Vector3 squareness_from_m_ = Vector3::Zero();
 };
 
 }  // namespace abbe::calib

@@ -2,9 +2,10 @@
 /// The linear rigid-body model V = M B U of a machine with three linear axes ([Sanders 2023]
 /// eq. (6) and its reference 14). U: parameters (parameter_layout.hpp), B U: errors of the axes
 /// interpolated between nodes (basis.hpp), M: their effect on the target. That is
-///     V(q) = sum_a [ d_a(q_a) + eps_a(q_a) x l_a(q) ] + (-EC0Y y + EB0Z z, -EA0Z z, 0)
+///     V(q) = sum_a [ d_a(q_a) + eps_a(q_a) x l_a(q) ] + (-EC0Y (y - y0) + EB0Z (z - z0),
+///                                                        -EA0Z (z - z0), 0)
 ///     l_a(q) = t + sum of q_b e_b over the axes b nearer to the tool than a
-/// q = (x, y, z): axis position, t: target offset, d_a and eps_a: translation and rotation errors
+/// (x0, y0, z0): ParameterLayout::squareness_from_m(), q = (x, y, z): axis position, t: target offset, d_a and eps_a: translation and rotation errors
 /// of axis a, l_a: lever of axis a, e_b: unit vector of axis b. The travel of an axis is not part
 /// of its own lever. The linearisation error against the exact product of transforms is of second
 /// order: 0.015 um on average for a mean error of 103 um.

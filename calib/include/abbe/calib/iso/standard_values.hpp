@@ -143,6 +143,8 @@ struct VolumeError {
   /// (three alike).
   double mean_U_m = 0.0, max_U_m = 0.0;
 };
+  /// U(V) without the rigid motion that fits best to the lattice: of the shape of V alone.
+  double rigid_free_mean_U_m = 0.0, rigid_free_max_U_m = 0.0;
 [[nodiscard]] Result<VolumeError> volume_error(const VolumetricModel&);
 
 }  // namespace abbe::calib::iso

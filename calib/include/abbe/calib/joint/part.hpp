@@ -1,7 +1,7 @@
 #pragma once
 /// Parts of a joint identification: what one method (or one run of it) states about the tables of a
 /// machine. Every part is an Information about the same unknowns,
-/// 1. the parameters U of the common tables in gauge G1 (the conditions of the gauge are exact),
+/// 1. the parameters U of the common tables in gauge G2 (the conditions of the gauge are exact),
 /// 2. effects: errors of instruments, artefacts and scales, each with the prior N(0, 1). Effects of
 ///    the same name are the same error in several parts.
 /// Nuisances of one part (pose of the tracker, poses of the array) are already eliminated.
@@ -36,7 +36,7 @@ struct CommonTables {
   estimation::TableBasis basis;
   Vector3 tool_offset_m = Vector3::Zero();
 };
-/// The tables of a model. NotApplicable unless it has tables in gauge G1 for one tool, without
+/// The tables of a model. NotApplicable unless it has tables in gauge G2 for one tool, without
 /// dependence on the direction of travel.
 [[nodiscard]] Result<CommonTables> tables_of(const VolumetricModel&);
 

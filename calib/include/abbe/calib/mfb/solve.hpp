@@ -1,7 +1,7 @@
 #pragma once
 /// Stage two: the 21 errors from the deviations of the points of interest, with their covariance.
 ///
-/// Joint: one weighted least-squares adjustment of all passes. Unknowns: the tables in gauge G1 and
+/// Joint: one weighted least-squares adjustment of all passes. Unknowns: the tables in gauge G2 and
 /// the squareness errors; per position the pose (3 translations, 3 rotations about the bar axes
 /// through the middle of the bar; roll with a prior), for each further tool 3 constants, for each
 /// pair 3 rates of drift and 3 constants of its second pass, an error of the temperature with
@@ -91,7 +91,7 @@ struct PairDrift {
 };
 
 struct Solution {
-  Eigen::VectorXd U;  ///< parameters of the model, gauge G1
+  Eigen::VectorXd U;  ///< parameters of the model, gauge G2
   Eigen::MatrixXd covariance;
   Statistics statistics;
   std::vector<BarPose> poses;  ///< by position, as estimated

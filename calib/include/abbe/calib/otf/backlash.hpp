@@ -68,7 +68,7 @@ struct Backlash {
 /// For the verdict: the tables with backlash beyond four standard uncertainties, each with its
 /// largest difference, and the differences that are not determined.
 [[nodiscard]] std::vector<std::string> notes_on(std::span<const Backlash>);
-/// The model of an adjustment with the unknowns U: gauge G1, mean of both directions, with the
+/// The model of an adjustment with the unknowns U: gauge G2, mean of both directions, with the
 /// differences if they were estimated. `covariance`: of U. `tool_offsets_m`: of all runs.
 [[nodiscard]] Result<VolumetricModel> model_of(const Observations&,
                                                std::span<const Vector3> tool_offsets_m,

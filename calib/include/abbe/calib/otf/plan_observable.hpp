@@ -14,7 +14,7 @@
 namespace abbe::calib::otf {
 
 struct Observability {
-  /// Errors that the path leaves undetermined in gauge G1: "EXX", "EC0Y". Empty: the path is
+  /// Errors that the path leaves undetermined in gauge G2: "EXX", "EC0Y". Empty: the path is
   /// sufficient.
   std::vector<std::string> undetermined;
   std::size_t rank = 0;    ///< of the legs that were evaluated

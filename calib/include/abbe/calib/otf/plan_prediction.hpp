@@ -53,7 +53,7 @@ struct PlannedRun {
 
 struct TableUncertainty {
   std::string name;    ///< "EXX", or "EC0Y" of a squareness error
-  double rms_u = 0.0;  ///< over the nodes, gauge G1; m or rad
+  double rms_u = 0.0;  ///< over the nodes, gauge G2; m or rad
   double max_u = 0.0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 /// The tables of a run that is not complete, with their uncertainties: pose of the tracker, moments
-/// of the samples (moments.hpp) and a solution in gauge G1 of what they determine so far.
+/// of the samples (moments.hpp) and a solution in gauge G2 of what they determine so far.
 ///
 /// The pose fits pairs (axis position, sample) taken at the vertices. Its error is estimated by the
 /// six rigid unknowns, which are linear. With the rotation phi and the displacement D (largest, over
@@ -36,7 +36,7 @@
 namespace abbe::calib::otf {
 
 struct NodeSoFar {
-  double value = 0.0, u = 0.0;  ///< m or rad, gauge G1; 0 if it is not determined
+  double value = 0.0, u = 0.0;  ///< m or rad, gauge G2; 0 if it is not determined
   bool determined = false;
 };
 

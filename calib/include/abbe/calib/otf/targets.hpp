@@ -6,7 +6,7 @@
 /// and has six rigid unknowns of its own,
 ///     y_k = A_k (U, T_k, r_k) + noise,   k = 1 .. number of runs
 /// so an unknown constant error of each target offset does not matter. The information of the runs
-/// is added (estimation/information.hpp) and solved with the 24 conditions of gauge G1 for 18
+/// is added (estimation/information.hpp) and solved with the 24 conditions of gauge G2 for 18
 /// tables. With Estimator::Joint each run is linearised again at the common solution (joint.hpp).
 ///
 /// With Options::nests each run has a drift of the tracker of its own, from its visits and the rows of

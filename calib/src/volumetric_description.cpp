@@ -176,6 +176,9 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
   }
 
   Result<VolumetricModel> model = d.polynomials ? polynomials_from(d) : tables_from(d);
+  if (model && d.misfit) {
+    model = model->with_misfit(*std::move(d.misfit));
+  }
   if (!model || !d.travel) {
     return model;
   }
@@ -204,6 +207,7 @@ ModelDescription VolumetricModel::description() const {
   if (travel_) {
     d.travel = travel_->differences;
   }
+  d.misfit = misfit_;
 
   return d;
 }

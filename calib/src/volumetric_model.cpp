@@ -236,6 +236,7 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
 
   if (const evemu::EvemuModel* model = polynomials()) {
     model->V_and_cov_at(axis_position_m, e.V_m, e.cov_V_m2);
+    e.cov_V_m2 += misfit_cov_V_m2(axis_position_m, tool_offset_m);
     return e;
   }
 
@@ -256,6 +257,7 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
   }
 
   e.cov_V_m2 = propagate(columns.span(), linear ? covariance_ : cov_Z_);
+  e.cov_V_m2 += misfit_cov_V_m2(axis_position_m, tool_offset_m);
   return e;
 }
 

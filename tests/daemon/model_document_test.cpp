@@ -285,6 +285,33 @@ TEST(ModelDocument, IsRefusedWithACovarianceThatIsNotPositive) {
                                                       HasSubstr("positive semidefinite"))));
 }
 
+TEST(ModelDocument, KeepsTheMisfit) {
+  auto document = synthetic_document(3);
+  const auto without = model_hash(document);
+  const auto n = document.model.U().size();
+  document.model =
+      document.model
+          .with_misfit({.u_of_parameters = Eigen::VectorXd::LinSpaced(n, 0.0, 1e-6 / 3),
+                        .u_V_m = {1e-6 / 7, 0.0, 2e-6},
+                        .table_length_m = 0.01 / 3,
+                        .V_length_m = 0.1})
+          .value();
+  const auto text = to_json(document);
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().text;
+  ASSERT_NE(read->model.misfit(), nullptr);
+  EXPECT_EQ(read->model.misfit()->u_of_parameters, document.model.misfit()->u_of_parameters);
+  EXPECT_EQ(read->model.misfit()->u_V_m, document.model.misfit()->u_V_m);
+  EXPECT_EQ(to_json(*read), text);
+  EXPECT_NE(model_hash(document), without);
+
+  const auto refused =
+      parse_model(replaced(text, "\"u_V_um\": [", "\"u_V_um\": [1,"), "model.json");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              ElementsAre(HasSubstr("misfit.u_V_um: 4 values, expected 3")));
+}
+
 TEST(ModelDocument, ReportsEveryFaultAtOnce) {
   auto text = to_json(synthetic_document(8));
   text = replaced(text, "\"gauge\": \"G1\"", "\"gauge\": \"G7\"");

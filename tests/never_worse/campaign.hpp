@@ -28,8 +28,22 @@ struct Outcome {
   double left_m = 0.0;      ///< mean |V of the model - true V|, without rigid motion
   double u_m = 0.0;         ///< mean stated standard uncertainty: root of the trace
   double sigma0 = 0.0;
+  double misfit_m = 0.0;  ///< mean of the part of the uncertainty that is misfit: root of the trace
   std::size_t covered = 0, intervals = 0;  ///< components of V inside their 95 % interval
+  /// Places at which the error that is left, without rigid motion, is at most U(V) (k = 2).
+  std::size_t below_U = 0, places = 0;
 };
+
+/// Calls work(i) for i < count on two threads.
+inline void on_two_threads(std::size_t count, const std::function<void(std::size_t)>& work) {
+  std::atomic<std::size_t> next{0};
+  const auto take = [&] {
+    for (std::size_t i; (i = next++) < count;) {
+      work(i);
+    }
+  };
+  const std::jthread one{take}, two{take};
+}
 
 inline Outcome refused(std::string reason) {
   Outcome o;
@@ -99,26 +113,22 @@ std::vector<Tally> tallies_of(const Campaign<Run>& campaign, int machines,
   const std::size_t faults = campaign.faults.size();
   const bool verbose = std::getenv("ABBE_NEVER_WORSE_VERBOSE") != nullptr;
   std::vector<Tally> tallies(faults);
-  std::atomic<std::size_t> next{0};
   std::mutex mutex;
 
-  const auto work = [&] {
-    for (std::size_t i; (i = next++) < static_cast<std::size_t>(machines) * faults;) {
-      const Fault<Run>& fault = campaign.faults[i % faults];
-      const std::uint64_t seed = first_seed + i / faults;
-      Run run = campaign.random_run(seed);
-      fault.put_in(run);
-      const Outcome o = campaign.identify_and_compare(std::move(run));
-      const std::lock_guard lock{mutex};
-      tallies[i % faults].count(o, fault.names);
-      if (verbose)
-        fmt::print("{} seed {}: {} before {:.2f} left {:.3f} u {:.3f} um sigma0 {:.2f} {}: {}\n",
-                   fault.name, seed, o.accepted ? "accepted" : "refused", 1e6 * o.before_m,
-                   1e6 * o.left_m, 1e6 * o.u_m, o.sigma0, o.first_cause, o.first_reason);
+  on_two_threads(static_cast<std::size_t>(machines) * faults, [&](std::size_t i) {
+    const Fault<Run>& fault = campaign.faults[i % faults];
+    const std::uint64_t seed = first_seed + i / faults;
+    Run run = campaign.random_run(seed);
+    fault.put_in(run);
+    const Outcome o = campaign.identify_and_compare(std::move(run));
+    const std::lock_guard lock{mutex};
+    tallies[i % faults].count(o, fault.names);
+    if (verbose) {
+      fmt::print("{} seed {}: {} before {:.2f} left {:.3f} u {:.3f} um sigma0 {:.2f} {}: {}\n",
+                 fault.name, seed, o.accepted ? "accepted" : "refused", 1e6 * o.before_m,
+                 1e6 * o.left_m, 1e6 * o.u_m, o.sigma0, o.first_cause, o.first_reason);
     }
-  };
-
-  { std::jthread one{work}, two{work}; }
+  });
   return tallies;
 }
 

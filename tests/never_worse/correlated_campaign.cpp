@@ -12,13 +12,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstdlib>
-#include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "abbe/calib/model_drift.hpp"
@@ -33,17 +30,6 @@ namespace {
 
 constexpr double kRange_m = 2e-6, kAngle_rad = 3e-6;
 constexpr std::array kCorrelations_s{0.0, 0.2, 1.0, 3.0, 10.0, 30.0};
-
-/// Calls work(i) for i < count on two threads.
-void on_two_threads(std::size_t count, const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next{0};
-  const auto take = [&] {
-    for (std::size_t i; (i = next++) < count;) {
-      work(i);
-    }
-  };
-  const std::jthread one{take}, two{take};
-}
 
 void add_slow_noise(OtfRun& run, double correlation_s) {
   if (correlation_s > 0.0) {

@@ -228,6 +228,7 @@ Vector3 reading_at(const EvemuRun& run, const Vector3& p_m, const Vector3& norma
   Vector3 q = at_m;
   for (int i = 0; i < 30; ++i) {
     Vector3 V = sim::error_m(run.truth, q, condition);
+    if (run.more_error_m) V += run.more_error_m(q);
     if (run.drift) V += run.drift(when, q);
     q = at_m - V;
   }
@@ -318,6 +319,18 @@ std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
   return found;
 }
 
+/// Variance of each component of V at the points due to misfit.
+Eigen::VectorXd misfit_variance_m2(const calib::VolumetricModel& model,
+                                   const std::vector<Vector3>& points) {
+  Eigen::VectorXd variance(3 * std::ssize(points));
+  for (Eigen::Index i = 0; i < std::ssize(points); ++i) {
+    variance.segment<3>(3 * i) =
+        model.misfit_cov_V_m2(points[static_cast<std::size_t>(i)], model.tool_offsets_m().front())
+            .diagonal();
+  }
+  return variance;
+}
+
 /// Compares the model with the truth, without the best-fit rigid motion of the difference, which
 /// the touches cannot determine.
 void compare(Outcome& outcome, const EvemuRun& run, const calib::VolumetricModel& model) {
@@ -332,6 +345,7 @@ void compare(Outcome& outcome, const EvemuRun& run, const calib::VolumetricModel
   for (Eigen::Index i = 0; i < std::ssize(points); ++i) {
     const Vector3& q = points[static_cast<std::size_t>(i)];
     truth.segment<3>(3 * i) = sim::error_m(truth_machine, q);
+    if (run.more_error_m) truth.segment<3>(3 * i) += run.more_error_m(q);
     left.segment<3>(3 * i) = model.V_at(q, run.machine.tool_offset_m) - truth.segment<3>(3 * i);
     B.middleRows<3>(3 * i) = polynomials.design().B(q);
   }
@@ -341,11 +355,17 @@ void compare(Outcome& outcome, const EvemuRun& run, const calib::VolumetricModel
   left = without_rigid(left);
   B = without_rigid(B);
   const Eigen::VectorXd variance =
-      (B * polynomials.covariance_m2()).cwiseProduct(B).rowwise().sum();
+      (B * polynomials.covariance_m2()).cwiseProduct(B).rowwise().sum() +
+      misfit_variance_m2(model, points);
   outcome.before_m = mean_length(without_rigid(truth));
   outcome.left_m = mean_length(left);
   outcome.u_m = mean_length(variance.cwiseMax(0.0).cwiseSqrt());
+  outcome.misfit_m = std::sqrt(misfit_variance_m2(model, points).head<3>().sum());
   constexpr double kNormal975 = 1.95996;
+  for (Eigen::Index i = 0; i < rows; i += 3) {
+    ++outcome.places;
+    outcome.below_U += left.segment<3>(i).norm() <= 2.0 * std::sqrt(variance.segment<3>(i).sum());
+  }
   outcome.intervals = static_cast<std::size_t>(rows);
   outcome.covered = static_cast<std::size_t>(
       (left.array().abs() <= kNormal975 * variance.array().max(0.0).sqrt()).count());

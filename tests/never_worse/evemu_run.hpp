@@ -40,6 +40,8 @@ struct EvemuRun {
   std::function<Eigen::Isometry3d(const TouchTime&)> moved;
   /// Displacement of a point of the array, in its own frame; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& place_m)> bent;
+  /// Error of the machine at a scale reading that no error motion of `truth` contains; may be empty.
+  std::function<Vector3(const Vector3& q_m)> more_error_m;
   /// Error of the machine in addition to the constant V, in machine coordinates; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& q_m)> drift;
   /// Changes the list of touches; may be empty.

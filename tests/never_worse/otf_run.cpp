@@ -79,8 +79,16 @@ Vector3 with_noise(const Vector3& p, const Vector3& noise, double range_m, doubl
   return p + range_m * noise.x() * er + angle_rad * p.norm() * (noise.y() * e1 + noise.z() * e2);
 }
 
+/// V at the reference position due to squareness alone, which gauge G2 sets to zero.
+Vector3 of_squareness_at_reference(const sim::TruthMachine& truth) {
+  const double y_m = truth.axes[1].range.reference_m, z_m = truth.axes[2].range.reference_m;
+  const sim::Squareness& s = truth.squareness;
+  return {-s.C0Y_rad * y_m + s.B0Z_rad * z_m, -s.A0Z_rad * z_m, 0.0};
+}
+
 void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& model) {
   constexpr int kSteps = 8;
+  const Vector3 constant_m = of_squareness_at_reference(run.truth);
   std::vector<Vector3> points, truth, difference;
   std::vector<calib::Matrix3> cov;
   const Vector3& t = run.truth.target_offset_m;
@@ -96,8 +104,7 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
           q(static_cast<Eigen::Index>(n)) =
               range.min_m + (range.max_m - range.min_m) * at[n] / kSteps;
         }
-        const Vector3 V =
-            sim::error_m(run.truth, q, {{}, 0.5 * run.truth.thermal.heat_after(900.0)});
+        const Vector3 V = true_error_m(run, q) - constant_m;
         const calib::VolumetricError e = model.error_at(q, run.machine.target_offset_m);
         points.push_back(q + t);
         truth.push_back(V);
@@ -123,6 +130,34 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
       }
     }
     outcome.u_m += std::sqrt(std::max(0.0, cov[i].trace())) / static_cast<double>(points.size());
+  }
+}
+
+/// At random places of the travels.
+void compare_with_U(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& model) {
+  constexpr int kPlaces = 500;
+  std::mt19937_64 random(kPlaces);
+  std::vector<Vector3> points, difference;
+  std::vector<double> U_m;
+  for (int i = 0; i < kPlaces; ++i) {
+    Vector3 q;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& range = run.truth.axes[k].range;
+      q(static_cast<Eigen::Index>(k)) = uniform(random, range.min_m, range.max_m);
+    }
+    const calib::VolumetricError e = model.error_at(q, run.machine.target_offset_m);
+    points.push_back(q + run.truth.target_offset_m);
+    difference.push_back(e.V_m - true_error_m(run, q));
+    U_m.push_back(2.0 * std::sqrt(std::max(0.0, e.cov_V_m2.trace())));
+    outcome.misfit_m +=
+        std::sqrt(model.misfit_cov_V_m2(q, run.machine.target_offset_m).trace()) / kPlaces;
+  }
+  const auto motion = calib::rigid_free(points, difference);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3 left_m = difference[i] - motion->rigid.head<3>() -
+                           calib::rotation_effect(points[i]) * motion->rigid.tail<3>();
+    ++outcome.places;
+    outcome.below_U += left_m.norm() <= U_m[i] ? 1 : 0;
   }
 }
 
@@ -359,6 +394,11 @@ std::vector<Fault<OtfRun>> otf_faults() {
   };
 }
 
+Vector3 true_error_m(const OtfRun& run, const Vector3& q_m) {
+  const Vector3 V_m = sim::error_m(run.truth, q_m, {{}, 0.5 * run.truth.thermal.heat_after(900.0)});
+  return run.more_error_m ? Vector3(V_m + run.more_error_m(q_m)) : V_m;
+}
+
 std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
   sim::PathPlan plan{.feed_m_per_s = run.feed_m_per_s, .dwell_s = run.dwell_s};
   for (const Vector3& q : run.driven_m) {
@@ -387,6 +427,9 @@ std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
     Vector3 p = sim::position_m(run.truth, m.q_m, condition) +
                 (run.scale - Vector3::Ones()).cwiseProduct(m.q_m);
 
+    if (run.more_error_m) {
+      p += run.more_error_m(m.q_m);
+    }
     p += std::sin(2.0 * M_PI * run.vibration_hz * t) * shaken_m;
     if (run.moved) {
       p = run.moved(share) * p;
@@ -464,6 +507,7 @@ Outcome identify_and_compare(OtfRun run) {
   outcome.first_cause = verdict->accepted ? "" : verdict->causes.front();
   outcome.sigma0 = found->solution.statistics.sigma0;
   compare(outcome, run, found->solution.model);
+  compare_with_U(outcome, run, found->solution.model);
 
   return outcome;
 }

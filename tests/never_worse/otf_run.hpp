@@ -25,6 +25,8 @@ struct OtfRun {
   sim::TruthMachine truth;
   std::vector<Vector3> driven_m;  ///< vertices, scale readings
   calib::RigidTransform T_machine_tracker;
+  /// Error of the machine at a scale reading that no error motion of `truth` contains; may be empty.
+  std::function<Vector3(const Vector3& q_m)> more_error_m;
   /// displacement of the target in the machine; may be empty
   std::function<calib::RigidTransform(double time_share)> moved;
   /// true travel per reading, due to the temperature of the scales
@@ -65,6 +67,9 @@ void set_up_again(OtfRun&);
 /// Adds a line through the reference (straightness: a parabola) to a true table, `by` where it is
 /// largest; "EC0Y": to this squareness.
 void move_table(OtfRun&, const std::string& table, double by);
+
+/// V of the machine at a scale reading, at the middle of the run.
+[[nodiscard]] Vector3 true_error_m(const OtfRun&, const Vector3& q_m);
 
 /// The tracker's samples of the run. Draws from run.random.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> measure(OtfRun& run);

@@ -129,6 +129,17 @@ Features all_features(const Observations& o, const VolumetricModel& model) {
   return all;
 }
 
+double centre_noise_m(const std::vector<FeatureResiduals>& all, double sigma_m) {
+  double squares = 0.0, count = 0.0;
+  for (const FeatureResiduals& f : all) {
+    if (f.feature == Feature::Ball) {
+      squares += f.response.topRows(3).squaredNorm() / 3.0;
+      count += 1.0;
+    }
+  }
+  return sigma_m * std::sqrt(squares / std::max(1.0, count));
+}
+
 double pooled_sigma_m(const std::vector<FeatureResiduals>& all) {
   std::vector<double> values;
   for (const FeatureResiduals& f : all) {

@@ -44,6 +44,10 @@ inline constexpr double kLeastFree = 0.05;
 /// normal noise.
 [[nodiscard]] double pooled_sigma_m(const std::vector<FeatureResiduals>&);
 
+/// Standard deviation of a ball centre per coordinate that follows from the standard deviation of a
+/// touch, rms over the balls.
+[[nodiscard]] double centre_noise_m(const std::vector<FeatureResiduals>&, double sigma_m);
+
 /// "position 3, ball 4"
 [[nodiscard]] std::string place_of(const Observations&, const FeatureResiduals&);
 

@@ -15,7 +15,9 @@
 #include "check_stopped.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/slow_noise.hpp"
+#include "mean_misfit.hpp"
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -203,6 +205,20 @@ void add_slow_noise(Verdict& verdict, const Solution& solution) {
   }
 }
 
+void note_misfit(Verdict& verdict, const Solution& solution) {
+  const Misfit* misfit = solution.model.misfit();
+  if (misfit == nullptr) {
+    return;
+  }
+  const double u_m = misfit->u_V_m.norm() / std::sqrt(3.0);
+  verdict.notes.push_back(message(
+      "the ball centres scatter about the model by ", kUmPerM * solution.statistics.s_m,
+      " um; touches and array do not explain ", kUmPerM * u_m,
+      " um of it in each direction: errors of the machine that polynomials of this order do not "
+      "follow (pitch of a screw, guideways), which are in the uncertainty, or the array is not "
+      "rigid"));
+}
+
 /// Largest distance of a ball from Ball1.
 double extent_m(const Observations& o) {
   double most_m = 0.0;
@@ -217,7 +233,8 @@ void note_what_touches_do_not_show(Verdict& verdict, const Observations& o, doub
   constexpr double kSteel_per_K = 11.5e-6;
   verdict.notes.push_back(message(
       "all lengths come from the array: 1 K of wrong temperature of a steel array is an error of ",
-      1e6 * kSteel_per_K * extent_m, " um over ", extent_m, " m; touches cannot show it"));
+      1e6 * kSteel_per_K * extent_m, " um over ", extent_m, " m, 1 um/m of its calibration ",
+      extent_m, " um; touches cannot show it"));
   verdict.notes.push_back(message("valid for the tool offset (",
                                   o.machine.tool_offset_m.transpose(),
                                   ") m of the configuration; touches cannot check it"));
@@ -316,7 +333,10 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
                       kShapeOnly));
         }
         const CorrectionSize size = correction_size(o, solution);
-        require_certainty(verdict, size.V_m, size.u_m);
+        const double of_misfit_m =
+            std::sqrt(mean_misfit_m2(solution.model, solution.model.validity().vertices_m()));
+        require_certainty(verdict, size.V_m, root_sum_of_squares(size.u_m, of_misfit_m));
+        note_misfit(verdict, solution);
         add_alternatives(verdict, *others, size);
         add_slow_noise(verdict, solution);
         note_artefact(o, verdict);

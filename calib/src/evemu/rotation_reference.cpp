@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "message.hpp"
 #include "quantile_999.hpp"
 
@@ -156,7 +157,10 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   }
 
   const Eigen::MatrixXd C_shape = shape_covariance(evemu, solution.rotation);
-  const Turn turn = turn_onto(rows, C_shape, reference.sigma_m);
+  const Misfit* misfit = solution.model.misfit();
+  const double sigma_m = root_sum_of_squares(
+      reference.sigma_m, misfit != nullptr ? misfit->u_V_m.norm() / std::sqrt(3.0) : 0.0);
+  const Turn turn = turn_onto(rows, C_shape, sigma_m);
   const double chi2_limit = turn.dof * chi2_per_dof_999(turn.dof);
 
   // Errors of a real machine are not exactly polynomials. With many points chi-square therefore
@@ -179,7 +183,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   // Error of the rotated coefficients: G (K (B dc + noise)) - dc, dc: error of the model's shape.
   const Eigen::MatrixXd kept =
       Eigen::MatrixXd::Identity(C_shape.rows(), C_shape.cols()) - G * (turn.K * rows.B);
-  const Matrix3 from_noise = reference.sigma_m * reference.sigma_m * turn.K * turn.K.transpose();
+  const Matrix3 from_noise = sigma_m * sigma_m * turn.K * turn.K.transpose();
   const Eigen::Matrix3Xd KB = turn.K * rows.B;
   const Matrix3 cov_rad2 = KB * C_shape * KB.transpose() + from_noise;
   Eigen::MatrixXd C = kept * C_shape * kept.transpose() + G * from_noise * G.transpose();
@@ -196,6 +200,10 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   return VolumetricModel::from_polynomials(*std::move(turned), Gauge::Ball1,
                                            solution.model.tool_offsets_m().front(),
                                            solution.model.validity())
+      .and_then([&](VolumetricModel model) {
+        return misfit != nullptr ? model.with_misfit(*misfit)
+                                 : Result<VolumetricModel>(std::move(model));
+      })
       .map([&](VolumetricModel model) {
         solution.model = std::move(model);
         solution.rotation.removed_rad -= turn.omega_rad;

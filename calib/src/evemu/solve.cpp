@@ -11,6 +11,7 @@
 #include "abbe/calib/estimation/null_space.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "evemu/constant_fields.hpp"
+#include "evemu/find_misfit.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/slow_noise.hpp"
 #include "message.hpp"
@@ -293,6 +294,10 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   return VolumetricModel::from_polynomials(*std::move(evemu),
                                            rotation->referenced ? Gauge::Ball1 : Gauge::Ball1Blocks,
                                            o.machine.tool_offset_m, *std::move(validity))
+      .and_then([&](VolumetricModel model) {
+        const std::optional<Misfit> misfit = find_misfit(o, model, statistics);
+        return misfit ? model.with_misfit(*misfit) : Result<VolumetricModel>(std::move(model));
+      })
       .map([&](VolumetricModel model) {
         return Solution{.model = std::move(model),
                         .raw_c_m = raw_c_m,

@@ -273,15 +273,7 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
     return found;
   }
 
-  double squares = 0.0, count = 0.0;
-  for (const FeatureResiduals& f : all) {
-    if (f.feature == Feature::Ball) {
-      squares += f.response.topRows(3).squaredNorm() / 3.0;
-      count += 1.0;
-    }
-  }
-
-  found.s_centre_m = found.sigma_m * std::sqrt(squares / std::max(1.0, count));
+  found.s_centre_m = centre_noise_m(all, found.sigma_m);
   const Backlash backlash = significant_backlash(all, found.sigma_m, false_alarm);
   const std::vector<FeatureResiduals> left = without(backlash, all);
   found.sigma_of_no_cause_m = pooled_sigma_m(left);

@@ -46,6 +46,9 @@ Eigen::MatrixXd drawn_from(const Eigen::MatrixXd& covariance) {
   return factors.transpositionsP().transpose() * z;
 }
 
+/// Cells of the volume along each axis with one misfit each, at most.
+constexpr int kMostCells = 5;
+
 /// Coefficients are 1 for translations and metres for rotations: smaller ones are rounding.
 template <class Derived>
 bool is_none(const Eigen::MatrixBase<Derived>& coefficients) {
@@ -61,18 +64,61 @@ ErrorFunctions::ErrorFunctions(const VolumetricModel& model)
     U_.conservativeResize(covariance_.rows());
     U_.tail(model.travel()->D.size()) = model.travel()->D;
   }
+  if (model.misfit() != nullptr) {
+    add_misfit();
+  }
   drawn_errors_ = drawn_from(covariance_);
 
   undetermined_.assign(static_cast<std::size_t>(model.U().size()), false);
   for (const otf::Backlash& difference : otf::backlash_of(model)) {
     undetermined_.push_back(!difference.determined);
   }
+  undetermined_.resize(static_cast<std::size_t>(U_.size()), false);
+}
+
+void ErrorFunctions::add_misfit() {
+  const Misfit& misfit = *model_->misfit();
+  covariance_.diagonal().head(misfit.u_of_parameters.size()) += misfit.u_of_parameters.cwiseAbs2();
+  const std::span<const Vector3> vertices_m = model_->validity().vertices_m();
+  if (!(misfit.u_V_m.maxCoeff() > 0.0) || vertices_m.empty()) {
+    return;
+  }
+
+  Vector3 high_m = vertices_m.front();
+  low_m_ = high_m;
+  for (const Vector3& v : vertices_m) {
+    low_m_ = low_m_.cwiseMin(v);
+    high_m = high_m.cwiseMax(v);
+  }
+  cell_m_ = ((high_m - low_m_) / kMostCells).cwiseMax(std::max(misfit.V_length_m, 1e-6));
+
+  misfit_ = U_.size();
+  constexpr Eigen::Index kUnknowns = 3 * kMostCells * kMostCells * kMostCells;
+  U_.conservativeResizeLike(Eigen::VectorXd::Zero(misfit_ + kUnknowns));
+  covariance_.conservativeResizeLike(Eigen::MatrixXd::Zero(U_.size(), U_.size()));
+  for (Eigen::Index i = 0; i < kUnknowns; ++i) {
+    covariance_(misfit_ + i, misfit_ + i) = misfit.u_V_m(i % 3) * misfit.u_V_m(i % 3);
+  }
+}
+
+Eigen::Index ErrorFunctions::misfit_at(const Vector3& q_m) const {
+  Eigen::Index cell = 0;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const double place = (q_m(a) - low_m_(a)) / cell_m_(a);
+    cell = cell * kMostCells + static_cast<Eigen::Index>(std::clamp(place, 0.0, kMostCells - 0.5));
+  }
+  return misfit_ + 3 * cell;
 }
 
 Eigen::RowVectorXd ErrorFunctions::row(const Vector3& q_m, const Vector3& along,
                                        const estimation::AxisTravel& travel) const {
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(U_.size());
+  if (misfit_ >= 0) {
+    row.segment<3>(misfit_at(q_m)) = along.transpose();
+  }
   if (const evemu::EvemuModel* polynomials = model_->polynomials(); polynomials != nullptr) {
-    return along.transpose() * polynomials->design().B(q_m);
+    row.head(model_->U().size()) = along.transpose() * polynomials->design().B(q_m);
+    return row;
   }
 
   const estimation::TableBasis& basis = basis_of(*model_);
@@ -80,7 +126,6 @@ Eigen::RowVectorXd ErrorFunctions::row(const Vector3& q_m, const Vector3& along,
   estimation::ModelColumns columns(memory);
   basis.append_columns(
       {.q_m = q_m, .tool_offset_m = model_->tool_offsets_m().front(), .travel = travel}, columns);
-  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(U_.size());
   for (const estimation::Column& c : columns.span()) {
     row(static_cast<Eigen::Index>(c.parameter)) += along.dot(c.dV_dU);
   }

@@ -11,7 +11,9 @@
 
 namespace abbe::calib::iso {
 
-/// Refers to the model and must not outlive it.
+/// Refers to the model and must not outlive it. The misfit of the model (misfit.hpp) is part of all
+/// uncertainties: that of a table is one more independent error of each of its nodes, that of V one
+/// error of each component in each cell of the volume.
 class ErrorFunctions {
  public:
   explicit ErrorFunctions(const VolumetricModel&);
@@ -19,7 +21,8 @@ class ErrorFunctions {
   [[nodiscard]] const VolumetricModel& model() const { return *model_; }
   [[nodiscard]] bool has_travel() const { return model_->travel() != nullptr; }
   /// Row a such that a U is the component of V along the unit vector `along`, U: the parameters,
-  /// followed by the differences between the directions of travel. With an unknown direction of an
+  /// followed by the differences between the directions of travel and, with a misfit of V, by this
+  /// misfit, whose value is 0. With an unknown direction of an
   /// axis: the mean of both.
   [[nodiscard]] Eigen::RowVectorXd row(const Vector3& q_m, const Vector3& along,
                                        const estimation::AxisTravel& travel = {}) const;
@@ -27,19 +30,25 @@ class ErrorFunctions {
   [[nodiscard]] Eigen::RowVectorXd table_row(const Table&, double position_m) const;
   [[nodiscard]] double value(const Eigen::RowVectorXd& row) const { return row.dot(U_); }
   [[nodiscard]] Value with_u(const Eigen::RowVectorXd& row) const;
-  /// A difference between the directions of travel that has an effect in `rows` is not determined by
-  /// the measurement: only its prior is known.
-  [[nodiscard]] bool has_undetermined_travel(const Eigen::MatrixXd& rows) const;
   /// Variance of each row times U.
   [[nodiscard]] Eigen::VectorXd variances(const Eigen::MatrixXd& rows) const {
     return (rows * covariance_).cwiseProduct(rows).rowwise().sum();
   }
+  /// A difference between the directions of travel that has an effect in `rows` is not determined by
+  /// the measurement: only its prior is known.
+  [[nodiscard]] bool has_undetermined_travel(const Eigen::MatrixXd& rows) const;
   /// Errors of the parameters as their covariance has them: parameters x draws. The opposite of each
   /// is as probable.
   [[nodiscard]] const Eigen::MatrixXd& drawn_errors() const { return drawn_errors_; }
 
  private:
+  void add_misfit();
+  /// Index of the first of the three unknowns of the misfit of V at an axis position.
+  [[nodiscard]] Eigen::Index misfit_at(const Vector3& q_m) const;
+
   const VolumetricModel* model_;
+  Eigen::Index misfit_ = -1;  ///< index of the first unknown of the misfit of V; -1: none
+  Vector3 low_m_ = Vector3::Zero(), cell_m_ = Vector3::Ones();
   Eigen::VectorXd U_;
   Eigen::MatrixXd covariance_;
   Eigen::MatrixXd drawn_errors_;

@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "elementary.hpp"
+
 namespace abbe::calib::otf {
 
 AddedColumns::AddedColumns(std::size_t columns, std::size_t unknowns) {
@@ -45,6 +47,15 @@ void AddedColumns::add(const AddedColumns& part, const std::vector<std::size_t>&
   CWC_(columns, columns) += part.CWC_;
   CWA_(columns, unknowns) += part.CWA_;
   CWr_(columns) += part.CWr_;
+}
+
+AddedColumns AddedColumns::first(std::size_t columns) const {
+  const auto k = static_cast<Eigen::Index>(columns);
+  AddedColumns part(columns, static_cast<std::size_t>(CWA_.cols()));
+  part.CWC_ = CWC_.topLeftCorner(k, k);
+  part.CWA_ = CWA_.topRows(k);
+  part.CWr_ = CWr_.head(k);
+  return part;
 }
 
 AddedColumns& AddedColumns::operator+=(const AddedColumns& other) {
@@ -100,16 +111,26 @@ AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q, double l
 
 AddedColumns::Estimate AddedColumns::estimate_with_prior(const Eigen::MatrixXd& Q, double u,
                                                          double factor) const {
+  return estimate_with_priors(Q, Eigen::VectorXd::Constant(CWr_.size(), u), factor);
+}
+
+AddedColumns::Estimate AddedColumns::estimate_with_priors(const Eigen::MatrixXd& Q,
+                                                          const Eigen::VectorXd& u,
+                                                          double factor) const {
   const Eigen::MatrixXd QAWC = Q * CWA_.transpose();
   const Eigen::Index k = CWr_.size();
   const Eigen::MatrixXd S = (CWC_ - CWA_ * QAWC) / factor;
   Eigen::MatrixXd information = 0.5 * (S + S.transpose());
-  information.diagonal().array() += 1.0 / (u * u);
+  information.diagonal() += u.cwiseAbs2().cwiseInverse();
   const Eigen::LLT<Eigen::MatrixXd> llt(information);
   Estimate e;
   e.columns = static_cast<std::size_t>(k);
   e.d = llt.solve(CWr_ / factor);
   e.drop = e.d.dot(CWr_) / factor;
+  e.twice_log_likelihood = e.drop;
+  for (Eigen::Index i = 0; i < k; ++i) {
+    e.twice_log_likelihood -= 2.0 * natural_logarithm(u(i) * llt.matrixLLT()(i, i));
+  }
   const Eigen::MatrixXd root = llt.matrixU().solve(Eigen::MatrixXd::Identity(k, k));
   e.u = root.rowwise().norm();
   e.root_cov_dU = QAWC * root;

@@ -25,6 +25,8 @@ class AddedColumns {
   /// Adds sums of some of the columns and unknowns; `columns`, `unknowns`: their places here.
   void add(const AddedColumns& part, const std::vector<std::size_t>& columns,
            const std::vector<std::size_t>& unknowns);
+  /// The sums of the first columns alone.
+  [[nodiscard]] AddedColumns first(std::size_t columns) const;
   AddedColumns& operator+=(const AddedColumns&);
   AddedColumns& operator-=(const AddedColumns&);
 
@@ -35,15 +37,19 @@ class AddedColumns {
     Eigen::VectorXd u;            ///< standard uncertainty of d
     Eigen::VectorXd dU;           ///< Q A^T W^2 C d: error of U if the columns are left out
     Eigen::MatrixXd root_cov_dU;  ///< root of the covariance of dU: covariance = root root^T
+    /// With a prior: 2 ln of the marginal likelihood, relative to that without the columns.
+    double twice_log_likelihood = 0.0;
   };
   /// Estimates d without a prior. Uses only the directions of d that decrease chi2 by at least
   /// `least_drop`. The other directions are noise, which would be amplified for columns that the
   /// model can almost reproduce. The weights of the rows are 1/sigma^2. Q: cofactor matrix of U.
   [[nodiscard]] Estimate estimate(const Eigen::MatrixXd& Q, double least_drop) const;
-  /// Estimates d with the prior N(0, u^2) for every column. The variances of the rows are `factor`
-  /// times the stated ones.
+  /// Estimates d with the prior N(0, u^2) for every column; u > 0. The variances of the rows are
+  /// `factor` times the stated ones.
   [[nodiscard]] Estimate estimate_with_prior(const Eigen::MatrixXd& Q, double u,
                                              double factor) const;
+  [[nodiscard]] Estimate estimate_with_priors(const Eigen::MatrixXd& Q, const Eigen::VectorXd& u,
+                                              double factor) const;
 
   /// The normal equations S d = g of the added columns after elimination of U, and the effect of d
   /// on U:

@@ -64,7 +64,9 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
                    after_linearisation(options))
           .and_then([&](Solution of_rows) {
             return prewhitened(std::move(of_rows), at_solution->observations, options);
-          });
+          })
+          .and_then(
+              [&](Solution s) { return with_misfit(std::move(s), at_solution->observations); });
   if (!solution) {
     return tl::unexpected(solution.error());
   }
@@ -78,6 +80,9 @@ Result<Identification> two_step(Observations observations, const Options& option
   Result<Solution> solution =
       observations.smoothness ? solve_smooth(observations, information_of(observations), options)
                               : solve(observations, options);
+  if (solution) {
+    solution = with_misfit(*std::move(solution), observations);
+  }
   if (!solution) {
     return tl::unexpected(solution.error());
   }

@@ -11,6 +11,7 @@
 #include "certainty.hpp"
 #include "message.hpp"
 #include "plausible_scale.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -32,7 +33,19 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others,
   }
 }
 
-/// Notes for scale errors that residuals do not show and for which no uncertainty is given.
+/// Note if the residuals are larger than the stated noise of the tracker.
+void note_chi_square(Verdict& verdict, const Statistics& s, const std::string& run) {
+  const auto dof = static_cast<double>(s.degrees_of_freedom);
+  const double limit = chi2_per_dof_999(dof);
+  if (s.chi2_per_dof > limit) {
+    verdict.notes.push_back(message(
+        run, "chi-square per degree of freedom is ", s.chi2_per_dof, ", at most ", limit,
+        " with the stated noise: the noise is larger than stated, or the machine has errors that "
+        "the model does not contain; the uncertainty is that of the residuals"));
+  }
+}
+
+/// Notes on scale errors, which residuals do not show.
 void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
   const std::vector<Vector3> at = tensor_grid(o.layout().nodes());
   Vector3 centre = Vector3::Zero();
@@ -47,11 +60,14 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
 
   const double lever_m = std::sqrt(squares / static_cast<double>(at.size()));
   constexpr double kSteel_per_K = 11.5e-6;
-  if (!(o.u_scale > 0.0)) {
-    verdict.notes.push_back(
-        message("not in the uncertainty: the scale of the tracker's ranges; 1 um/m would be ",
-                two_digits(lever_m), " um rms"));
-  }
+  verdict.notes.push_back(
+      o.u_scale > 0.0
+          ? message("the scale of the model is that of the tracker's ranges, of which u contains ",
+                    two_digits(1e6 * o.u_scale),
+                    " um/m; 1 um/m, or 1 K of wrong temperature of the ", "air, would be ",
+                    two_digits(lever_m), " um rms; residuals do not show it")
+          : message("not in the uncertainty: the scale of the tracker's ranges; 1 um/m would be ",
+                    two_digits(lever_m), " um rms"));
 
   if (*std::max_element(o.u_axis_scale.begin(), o.u_axis_scale.end()) <= 0.0) {
     verdict.notes.push_back(
@@ -156,6 +172,7 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
     for (const std::string& note : runs[k].notes) {
       verdict.notes.push_back(run + note);
     }
+    note_chi_square(verdict, solutions[k].statistics, run);
     note_drift(verdict, runs[k], solutions[k], run);
     add_alternatives(verdict, others[k], run);
     note_set_aside(verdict, runs[k], run);

@@ -12,6 +12,7 @@
 #include "check_stopped.hpp"
 #include "chi2_bound.hpp"
 #include "elementary.hpp"
+#include "mean_misfit.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/alternative_columns.hpp"
@@ -335,7 +336,9 @@ std::vector<decltype(&closer_nodes)> other_designs(Tables tables) {
 CorrectionSize correction_size(const VolumetricModel& model) {
   const RigidFreeNorm norm =
       rigid_free_norm(model.tables()->layout(), model.tool_offsets_m().front());
-  return {norm.rms_m(model.U()), norm.rms_u_m(model.covariance())};
+  const double of_misfit_m = std::sqrt(mean_misfit_m2(model, sparse_grid(model.nodes())));
+  return {norm.rms_m(model.U()),
+          root_sum_of_squares(norm.rms_u_m(model.covariance()), of_misfit_m)};
 }
 
 std::string_view name(Cause cause) {

@@ -118,7 +118,7 @@ Eigen::MatrixXd covariance_of(const Observations& o, const Adjustment& a) {
   }
   const std::vector<double> no_residuals(o.rows.size(), 0.0);
   const Eigen::MatrixXd root =
-      with_range_offset(o, WhitenedRows(o), a, no_residuals, 1.0).root_of_covariance;
+      with_run_effects(o, WhitenedRows(o), a, no_residuals, 1.0).root_of_covariance;
   return a.covariance + root * root.transpose();
 }
 

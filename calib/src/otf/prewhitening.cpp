@@ -61,6 +61,8 @@ struct Whitened {
   std::vector<double> residual_m;  ///< of the observations' own rows
   double variance_factor = 1.0;
   std::optional<OffsetInModel> offset_in_model{};
+  Eigen::MatrixXd covariance_of_noise{};
+  std::optional<TwoAxisErrors> two_axes{};
 };
 
 Result<Whitened> adjust_whitened(const Observations& o, const WhitenedRows& rows,
@@ -93,8 +95,9 @@ Result<Whitened> adjust_whitened(const Observations& o, const WhitenedRows& rows
     w.U = std::move(drift->U);
     w.residual_m = std::move(drift->residual_m);
     w.variance_factor = factor(w.residual_m);
-  } else if (o.u_range_offset_m > 0.0) {
-    WithRangeOffset with = with_range_offset(o, rows, *a, w.residual_m, w.variance_factor);
+  } else {
+    WithRunEffects with = with_run_effects(o, rows, *a, w.residual_m, w.variance_factor);
+    w.two_axes = with.two_axes;
     w.U = std::move(with.U);
     w.residual_m = std::move(with.residual_m);
     w.variance_factor = factor(w.residual_m);
@@ -103,6 +106,7 @@ Result<Whitened> adjust_whitened(const Observations& o, const WhitenedRows& rows
   }
 
   w.covariance = w.variance_factor * a->covariance;
+  w.covariance_of_noise = w.covariance;
   w.covariance += of_offset * of_offset.transpose();
   if (drift) {
     w.covariance += drift->added_covariance;
@@ -156,6 +160,8 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
   s.clock = w->U.tail(static_cast<Eigen::Index>(o.clock_unknowns));
   s.covariance_with_rigid = std::move(w->covariance);
   s.offset_in_model = std::move(w->offset_in_model);
+  s.fit = {std::move(w->U), std::move(w->residual_m), std::move(w->covariance_of_noise),
+           noise->correlation_time, w->two_axes};
   s.statistics.variance_factor = w->variance_factor;
   s.statistics.noise_correlation = {rows.lag_1(0), rows.lag_1(1)};
   return s;

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
+#include "otf/find_misfit.hpp"
 #include "otf/row_residuals.hpp"
 #include "otf/run_statistics.hpp"
 #include "otf/systematic_effects.hpp"
@@ -67,6 +69,13 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   s.alignment_rms_m = o.alignment.last_rms_m;
 
   return s;
+}
+
+double block_distance(const Observations& o) {
+  if (o.block_s.size() < 2) {
+    return 1.0;
+  }
+  return (o.block_s.back() - o.block_s.front()) / static_cast<double>(o.block_s.size() - 1);
 }
 
 namespace {
@@ -150,6 +159,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   RangeOffset offset;
   Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
   std::optional<OffsetInModel> offset_in_model;
+  std::optional<TwoAxisErrors> two_axes;
   std::optional<WithDrift> drift;
 
   if (o.drift) {
@@ -167,10 +177,11 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
     a->U = std::move(drift->U);
     residuals.after_m = std::move(drift->residual_m);
     figures = statistics(o, *a, residuals);
-  } else if (o.u_range_offset_m > 0.0) {
-    WithRangeOffset with =
-        with_range_offset(o, as_observed, *a, residuals.after_m, figures.variance_factor);
+  } else {
+    WithRunEffects with =
+        with_run_effects(o, as_observed, *a, residuals.after_m, figures.variance_factor);
     offset = with.offset;
+    two_axes = with.two_axes;
     root_of_offset = std::move(with.root_of_covariance);
     offset_in_model = std::move(with.in_model);
     a->U = std::move(with.U);
@@ -179,6 +190,8 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   }
 
   a->covariance *= figures.variance_factor;
+  FitOfRows fit{a->U, residuals.after_m, a->covariance, figures.correlation * block_distance(o),
+                two_axes};
   a->covariance += root_of_offset * root_of_offset.transpose();
   if (drift) {
     a->covariance += drift->added_covariance;
@@ -204,10 +217,38 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
       .statistics = figures,
       .residuals = std::move(residuals),
       .range_offset = offset,
+      .two_axes = two_axes,
       .backlash = backlash_of(o, a->U, a->covariance),
       .drift = drift ? std::optional(std::move(drift->drift)) : std::nullopt,
       .smoothness = o.smoothness,
-      .offset_in_model = std::move(offset_in_model)};
+      .offset_in_model = std::move(offset_in_model),
+      .fit = std::move(fit)};
+}
+
+Result<Solution> with_misfit(Solution s, Observations& o) {
+  std::vector<std::size_t> at(o.unknowns());
+  std::iota(at.begin(), at.end(), std::size_t{0});
+  const ResidualsOfRun run{o, s.fit.residual_m, std::move(at), s.fit.correlation_time,
+                           s.fit.two_axes};
+  std::optional<FoundMisfit> found =
+      find_misfit(std::span(&run, 1), s.fit.covariance_of_noise, s.adjustment.cofactor_Q);
+  if (!found) {
+    return s;
+  }
+
+  s.covariance_with_rigid += found->root_of_covariance * found->root_of_covariance.transpose();
+  Result<VolumetricModel> model = model_of(o, std::array{o.target_offset_m}, s.fit.U,
+                                           s.covariance_with_rigid, s.model.validity());
+  if (model) {
+    model = model->with_misfit(std::move(found->misfit));
+  }
+  if (!model) {
+    return tl::unexpected(model.error());
+  }
+  s.model = *std::move(model);
+  s.backlash = backlash_of(o, s.fit.U, s.covariance_with_rigid);
+  o.notes.insert(o.notes.end(), found->notes.begin(), found->notes.end());
+  return s;
 }
 
 }  // namespace abbe::calib::otf

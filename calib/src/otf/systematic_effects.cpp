@@ -1,5 +1,8 @@
 #include "otf/systematic_effects.hpp"
 
+#include <algorithm>
+#include <array>
+#include <utility>
 #include <vector>
 
 #include "axis_scale_columns.hpp"
@@ -32,32 +35,126 @@ Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
   return slope;
 }
 
-WithRangeOffset with_range_offset(const Observations& o, const WhitenedRows& rows,
-                                  const Adjustment& a, std::span<const double> residual_m,
-                                  double factor) {
-  AddedColumns sums(1, o.unknowns());
-  std::vector<double> c;
-  for (const Observation& row : o.rows) {
-    c.push_back(drow_drange_offset(o, row));
-  }
-  c = rows.values(c);
-  const std::vector<double> r_m = rows.values(residual_m);
-  for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    sums.add(o.rows[i], rows.row(i), r_m[i], std::span(&c[i], 1));
+namespace {
+
+/// The range offset, if it has a prior, and the errors of two axes as added columns.
+class RunEffects {
+ public:
+  RunEffects(const Observations& o, const WhitenedRows& rows, std::span<const double> residual_m)
+      : o_(o), has_offset_(o.u_range_offset_m > 0.0), sums_(columns(), o.unknowns()) {
+    const auto n = static_cast<Eigen::Index>(columns());
+    RowMatrix values = RowMatrix::Zero(std::ssize(o.rows), n);
+    for (std::size_t i = 0; i < o.rows.size(); ++i) {
+      set_values(values.row(static_cast<Eigen::Index>(i)), o.rows[i]);
+    }
+    rows.apply(values);
+    const std::vector<double> r_m = rows.values(residual_m);
+    for (std::size_t i = 0; i < o.rows.size(); ++i) {
+      sums_.add(o.rows[i], rows.row(i), r_m[i],
+                std::span(values.row(static_cast<Eigen::Index>(i)).data(), columns()));
+    }
   }
 
-  const AddedColumns::Estimate e =
-      sums.estimate_with_prior(a.cofactor_Q, o.u_range_offset_m, factor);
-  const RangeOffset offset{e.d(0), e.u(0)};
-  const Eigen::VectorXd U = a.U - e.dU;
-  const OffsetInModel in_model{
-      .dU_dd =
-          sums.reduced(a.cofactor_Q).dU_dd.col(0).head(static_cast<Eigen::Index>(o.basis.size())),
-      .value_m = offset.value_m,
-      .u_m = offset.u_m,
-      .u_prior_m = o.u_range_offset_m};
-  return {offset, U, e.root_cov_dU, residuals_m(without_range_offset(o, offset.value_m), U),
-          in_model};
+  /// s of two_axis_errors.hpp; 0: without errors of two axes.
+  [[nodiscard]] AddedColumns::Estimate estimate(const Eigen::MatrixXd& Q, double s_m,
+                                                double factor) const {
+    if (s_m > 0.0) {
+      Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(columns()), s_m);
+      if (has_offset_) {
+        u(0) = o_.u_range_offset_m;
+      }
+      return sums_.estimate_with_priors(Q, u, factor);
+    }
+    if (has_offset_) {
+      return sums_.first(1).estimate_with_prior(Q, o_.u_range_offset_m, factor);
+    }
+    const Eigen::Index n = Q.rows();
+    return {.dU = Eigen::VectorXd::Zero(n), .root_cov_dU = Eigen::MatrixXd::Zero(n, 1)};
+  }
+  [[nodiscard]] bool has_offset() const { return has_offset_; }
+  [[nodiscard]] AddedColumns::Reduced reduced(const Eigen::MatrixXd& Q) const {
+    return sums_.reduced(Q);
+  }
+
+ private:
+  [[nodiscard]] std::size_t columns() const { return kTwoAxisErrors + (has_offset_ ? 1 : 0); }
+  void set_values(Eigen::Ref<Eigen::RowVectorXd> values, const Observation& row) const {
+    Eigen::Index at = 0;
+    if (has_offset_) {
+      values(at++) = drow_drange_offset(o_, row);
+    }
+    const Vector3 products = TwoAxisErrors::products(o_.layout().nodes(), row.axis_position_m);
+    for (Eigen::Index pair = 0; pair < 3; ++pair) {
+      values.segment<3>(at + 3 * pair) = products(pair) * row.direction.transpose();
+    }
+  }
+
+  const Observations& o_;
+  bool has_offset_;
+  AddedColumns sums_;
+};
+
+/// The size of the errors of two axes with the largest likelihood; 0 if chance explains them.
+double likely_two_axis_errors_m(const RunEffects& effects, const Eigen::MatrixXd& Q,
+                                double factor) {
+  constexpr std::array kSizes_m{0.25e-6, 0.5e-6, 1e-6, 2e-6, 4e-6, 8e-6, 16e-6, 32e-6};
+  constexpr double kBeyondChance = 25.0;  // of 2 ln L: probability below 1e-5 by chance
+  const double without = effects.estimate(Q, 0.0, factor).twice_log_likelihood;
+  double best_m = 0.0, best = without + kBeyondChance;
+  for (const double s_m : kSizes_m) {
+    const double found = effects.estimate(Q, s_m, factor).twice_log_likelihood;
+    if (found > best) {
+      best_m = s_m;
+      best = found;
+    }
+  }
+  return best_m;
+}
+
+TwoAxisErrors two_axis_errors(const AddedColumns::Estimate& e) {
+  TwoAxisErrors found;
+  const Eigen::Index first = e.d.size() - static_cast<Eigen::Index>(kTwoAxisErrors);
+  for (std::size_t i = 0; i < kTwoAxisErrors; ++i) {
+    found.D_m[i] = e.d(first + static_cast<Eigen::Index>(i));
+    found.u_m[i] = e.u(first + static_cast<Eigen::Index>(i));
+  }
+  return found;
+}
+
+}  // namespace
+
+Observations without_two_axis_errors(Observations o, const TwoAxisErrors& errors) {
+  for (Observation& row : o.rows) {
+    row.y_m -= row.direction.dot(errors.V_m(o.layout().nodes(), row.axis_position_m));
+  }
+  return o;
+}
+
+WithRunEffects with_run_effects(const Observations& o, const WhitenedRows& rows,
+                                const Adjustment& a, std::span<const double> residual_m,
+                                double factor) {
+  const RunEffects effects(o, rows, residual_m);
+  const double s_m = likely_two_axis_errors_m(effects, a.cofactor_Q, factor);
+  const AddedColumns::Estimate e = effects.estimate(a.cofactor_Q, s_m, factor);
+
+  WithRunEffects with{.U = a.U - e.dU, .root_of_covariance = e.root_cov_dU};
+  Observations left = o;
+  if (effects.has_offset()) {
+    with.offset = {e.d(0), e.u(0)};
+    left = without_range_offset(std::move(left), with.offset.value_m);
+    with.in_model = OffsetInModel{.dU_dd = effects.reduced(a.cofactor_Q)
+                                               .dU_dd.col(0)
+                                               .head(static_cast<Eigen::Index>(o.basis.size())),
+                                  .value_m = with.offset.value_m,
+                                  .u_m = with.offset.u_m,
+                                  .u_prior_m = o.u_range_offset_m};
+  }
+  if (s_m > 0.0) {
+    with.two_axes = two_axis_errors(e);
+    left = without_two_axis_errors(std::move(left), *with.two_axes);
+  }
+  with.residual_m = residuals_m(left, with.U);
+  return with;
 }
 
 void add_scale_effects(Eigen::MatrixXd& covariance, const Observations& o, const WhitenedRows& rows,

@@ -8,6 +8,7 @@
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/drift_of_runs.hpp"
+#include "otf/find_misfit.hpp"
 #include "otf/observed_runs.hpp"
 #include "otf/priors.hpp"
 #include "otf/row_residuals.hpp"
@@ -167,6 +168,21 @@ Result<VolumetricModel> model_of_runs(std::span<const Observations> runs, const 
   });
 }
 
+/// The misfit that the residuals of all runs show together.
+std::optional<FoundMisfit> misfit_of_runs(std::span<const Observations> runs,
+                                          std::span<const Residuals> residuals,
+                                          const Statistics& statistics,
+                                          const Eigen::MatrixXd& of_noise,
+                                          const Eigen::MatrixXd& Q) {
+  const RunUnknowns unknowns(runs);
+  std::vector<ResidualsOfRun> all;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    all.push_back({runs[k], residuals[k].after_m, unknowns.of_run(k),
+                   statistics.correlation * block_distance(runs[k])});
+  }
+  return find_misfit(all, of_noise, Q);
+}
+
 Result<Adjustment> adjust_runs(std::span<const Observations> runs, const Options& options) {
   const estimation::Information rows = rows_information(runs);
   Result<Adjustment> a = gauge_of_runs(runs.front().basis, rows.unknowns())
@@ -314,11 +330,19 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
   FitOfRuns& fit = *found_fit;
   a->U = std::move(fit.U);
   a->covariance *= fit.all.variance_factor;
+  std::optional<FoundMisfit> misfit =
+      misfit_of_runs(runs, fit.residuals, fit.all, a->covariance, a->cofactor_Q);
   a->covariance += fit.added_covariance;
   add_scales_of_runs(a->covariance, runs, a->cofactor_Q);
   fit.all.iterations = adjustments;
+  if (misfit) {
+    a->covariance += misfit->root_of_covariance * misfit->root_of_covariance.transpose();
+    runs.front().notes.insert(runs.front().notes.end(), misfit->notes.begin(), misfit->notes.end());
+  }
 
-  const Result<VolumetricModel> model = model_of_runs(runs, *a);
+  const Result<VolumetricModel> model = model_of_runs(runs, *a).and_then([&](VolumetricModel m) {
+    return misfit ? m.with_misfit(misfit->misfit) : Result<VolumetricModel>(std::move(m));
+  });
   if (!model) {
     return tl::unexpected(model.error());
   }

@@ -6,6 +6,7 @@
 
 #include "otf/drift_columns.hpp"
 #include "otf/row_residuals.hpp"
+#include "otf/systematic_effects.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -89,6 +90,9 @@ Observations without_drift(Observations o, const TrackerDrift& drift) {
 
 Observations without_run_effects(Observations o, const Solution& solution) {
   o = without_range_offset(std::move(o), solution.range_offset.value_m);
+  if (solution.two_axes) {
+    o = without_two_axis_errors(std::move(o), *solution.two_axes);
+  }
   return solution.drift ? without_drift(std::move(o), *solution.drift) : o;
 }
 

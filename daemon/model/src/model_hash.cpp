@@ -96,6 +96,16 @@ void add_travel(Canonical& out, const calib::TravelDifferences& travel) {
   }
 }
 
+/// Only if the model has a misfit: other models have the hash of earlier versions.
+void add_misfit(Canonical& out, const calib::Misfit& misfit) {
+  out.text("misfit");
+  out.count(static_cast<std::size_t>(misfit.u_of_parameters.size()));
+  for (const double u : misfit.u_of_parameters) out.number(u);
+  out.vector(misfit.u_V_m);
+  out.number(misfit.table_length_m);
+  out.number(misfit.V_length_m);
+}
+
 }  // namespace
 
 std::string model_hash(const ModelDocument& document) {
@@ -108,6 +118,7 @@ std::string model_hash(const ModelDocument& document) {
   out.vectors(model.validity().vertices_m());
   if (document.artefact) add_artefact(out, *document.artefact);
   if (model.travel() != nullptr) add_travel(out, *model.travel());
+  if (model.misfit() != nullptr) add_misfit(out, *model.misfit());
   return out.hex();
 }
 

@@ -10,6 +10,7 @@
 #include "abbe/model/model_document.hpp"
 #include "model_reader.hpp"
 #include "read_bar_figures.hpp"
+#include "read_misfit.hpp"
 #include "read_run_figures.hpp"
 #include "read_travel.hpp"
 #include "verdict_json.hpp"
@@ -272,9 +273,13 @@ Result<ModelDocument> read_document(ModelReader& in) {
     in.fault("covariance", valid.error().text);
   const auto travel = read_travel(in, description.parameters.size());
   if (travel) description.travel = travel->differences;
+  description.misfit = read_misfit(in);
+  const bool has_misfit = description.misfit.has_value();
   auto model = calib::VolumetricModel::from_description(std::move(description));
   if (!model && !in.any())
-    in.fault(travel ? "parameters or travel" : "parameters", model.error().text);
+    in.fault(
+        fmt::format("parameters{}{}", travel ? " or travel" : "", has_misfit ? " or misfit" : ""),
+        model.error().text);
   if (model && travel) check_names(in, *travel, *model);
   const auto statistics = read_statistics(in);
   const auto inputs = read_inputs(in);

@@ -290,6 +290,19 @@ void write_run(JsonText& out, const RunFigures& run) {
       further_figures(run)));
 }
 
+void write_misfit(JsonText& out, const calib::Misfit& misfit) {
+  std::string of_parameters;
+  for (Eigen::Index i = 0; i < misfit.u_of_parameters.size(); ++i)
+    of_parameters.append(i > 0 ? "," : "")
+        .append(to_decimal(misfit.u_of_parameters[i], kMicroUnit));
+  out.key("misfit");
+  out.raw(
+      fmt::format("{{\"u_V_um\": {}, \"V_length_mm\": {}, \"table_length_mm\": {},\n    "
+                  "\"u_of_parameters\": [{}]}}",
+                  vector_um(misfit.u_V_m), to_decimal(misfit.V_length_m, kMm),
+                  to_decimal(misfit.table_length_m, kMm), of_parameters));
+}
+
 void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {
   out.key("tracker_drift");
   out.raw(fmt::format("{{\"largest_um\": {}, \"nest_repeatability_um\": {}, \"visits\": {}}}",
@@ -379,6 +392,7 @@ std::string to_json(const ModelDocument& document) {
   write_parameters(out, model);
   if (!document.backlash.empty()) write_backlash(out, document.backlash);
   if (model.travel() != nullptr) write_travel(out, model);
+  if (model.misfit() != nullptr) write_misfit(out, *model.misfit());
   write_covariance(out, model.covariance());
 
   return out.finish();

@@ -65,12 +65,16 @@ std::vector<std::string> signs_in_words() {
 }
 
 std::vector<std::string> not_in_the_uncertainty(const ModelDocument& document) {
+  std::string misfit =
+      "errors between the nodes of the tables, and errors that depend on several axes at once";
+  if (document.method == "otf")
+    misfit += ", as far as they do not repeat at a place beyond chance; else they are in U(V)";
+  if (document.model.tables() == nullptr)
+    misfit =
+        "errors of a higher degree than the polynomials have, as far as touches and array explain "
+        "the scatter of the ball centres; else they are in U(V)";
   std::vector<std::string> list{
-      document.model.tables() != nullptr
-          ? "errors between the nodes of the tables that the interpolation does not follow"
-          : "errors of a higher degree than the polynomials have",
-      "lack of fit that the residuals do not show, for example errors that depend on two axes at "
-      "once",
+      misfit, "lack of fit that the residuals do not show",
       "changes of the machine after the measurement: temperature, load, wear, collisions",
       "the workpiece and its clamping, the spindle, the tool, dynamics at other feeds"};
   if (document.method == "otf" && !document.tracker_drift)

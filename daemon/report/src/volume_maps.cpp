@@ -78,14 +78,15 @@ std::string summary(const ValueMaps& maps) {
 }
 
 struct ModelMaps {
-  ValueMaps V, U;
+  ValueMaps V, U, misfit;  ///< misfit: the part of U(V) that it causes; not drawn
 };
 
 /// |V| and U(V) at the middles of the cells.
 ModelMaps maps_of(const calib::VolumetricModel& model) {
   const VolumeCuts cuts = volume_cuts(model.validity(), kMostCells);
   ModelMaps maps{empty_maps(cuts, "Before: error |V| of the machine without compensation", "um"),
-                 empty_maps(cuts, "After: expanded uncertainty U(V), k = 2", "um")};
+                 empty_maps(cuts, "After: expanded uncertainty U(V), k = 2", "um"),
+                 empty_maps(cuts, "", "um")};
   const std::size_t columns = cuts.x_edges_m.size() - 1, rows = cuts.y_edges_m.size() - 1;
   Vector3 q = Vector3::Zero();
 
@@ -102,6 +103,9 @@ ModelMaps maps_of(const calib::VolumetricModel& model) {
       if (!e.inside) continue;
       maps.V.maps[slab].values[i] = e.V_m.norm() * kUmPerM;
       maps.U.maps[slab].values[i] = 2.0 * std::sqrt(e.cov_V_m2.trace()) * kUmPerM;
+      maps.misfit.maps[slab].values[i] =
+          2.0 * kUmPerM *
+          std::sqrt(model.misfit_cov_V_m2(q, model.tool_offsets_m().front()).trace());
     }
   }
 
@@ -237,14 +241,19 @@ void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
   const ModelMaps maps = maps_of(model);
   page.maps(maps.V);
   page.maps(maps.U);
-  page.facts({{"before, |V|", summary(maps.V)},
-              {"after, U(V): |V| left is below it with 95 to 99 %", summary(maps.U)}});
+  page.facts(
+      {{"before, |V|", summary(maps.V)},
+       {"after, U(V): |V| left is below it with 95 to 99 %", summary(maps.U)},
+       {"of U(V) due to misfit: errors that repeat at a place and that the form of the model "
+        "cannot represent",
+        model.misfit() != nullptr ? summary(maps.misfit) : "none found"}});
   page.paragraph(
       "U(V): twice the root of the sum of the variances of the three components (coverage factor k "
-      "= 2), in the gauge of the model. |V| that is left after compensation is below U(V) with 95 to "
-      "99 %, apart from what U(V) does not contain: errors between the nodes or of a higher degree "
-      "than the model has, lack of fit that the residuals do not show, and changes of the machine "
-      "after the measurement, for example with temperature.");
+      "= 2), in the gauge of the model. |V| that is left after compensation is below U(V) with 95 "
+      "to "
+      "99 %, apart from what U(V) does not contain: lack of fit that the residuals do not show, "
+      "and "
+      "changes of the machine after the measurement, for example with temperature.");
   if (observations_of(held_out) > 0) add_held_out_cells(page, model.validity(), held_out);
 }
 

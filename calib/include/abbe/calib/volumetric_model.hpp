@@ -9,6 +9,9 @@
 /// A rigid motion of the whole volume is not estimable and not part of a model; neither are errors
 /// outside the validity volume.
 ///
+/// The covariance of V contains the misfit of the model (misfit.hpp); that of the parameters
+/// contains its effect on them.
+///
 /// With backlash (travel_differences.hpp) V depends on the direction in which each axis last moved.
 /// Functions without this direction give the mean of both directions; the covariance contains half
 /// the difference, not its uncertainty. error_at() with all directions unknown contains both.
@@ -30,6 +33,7 @@
 #include "abbe/calib/evemu/model.hpp"
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/geometry.hpp"
+#include "abbe/calib/misfit.hpp"
 #include "abbe/calib/parameter_layout.hpp"
 #include "abbe/calib/travel_differences.hpp"
 #include "abbe/calib/validity_volume.hpp"
@@ -81,6 +85,8 @@ struct ModelDescription {
   estimation::Interpolation interpolation = estimation::Interpolation::Linear;
   /// Tables only. `covariance` contains half the differences (TravelDifferences).
   std::optional<TravelDifferences> travel{};
+  /// Misfit, in addition to `covariance`, which contains its effect on the parameters.
+  std::optional<Misfit> misfit{};
 };
 
 /// Immutable value; all member functions are const and may be called from any thread.
@@ -117,6 +123,9 @@ class VolumetricModel {
   /// half of them: half_differences() times its transpose. BadInput for polynomials, wrong sizes, or
   /// a covariance, with that of the tables, not positive semidefinite; NotFinite for NaN.
   [[nodiscard]] Result<VolumetricModel> with_travel(TravelDifferences) const;
+  /// The same model with another misfit; no misfit if !Misfit::any(). BadInput for a wrong size or a
+  /// negative value, NotFinite for NaN.
+  [[nodiscard]] Result<VolumetricModel> with_misfit(Misfit) const;
 
   /// V with its covariance. Takes about 1 us, 4 us for cubic tables. No allocation.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
@@ -171,6 +180,11 @@ class VolumetricModel {
   [[nodiscard]] const estimation::TableBasis* travel_tables() const {
     return travel_ ? &travel_->basis : nullptr;
   }
+  /// Null without misfit.
+  [[nodiscard]] const Misfit* misfit() const { return misfit_ ? &*misfit_ : nullptr; }
+  /// What the misfit adds to the covariance of V, for a tool for which the model is valid.
+  [[nodiscard]] Matrix3 misfit_cov_V_m2(const Vector3& axis_position_m,
+                                        const Vector3& tool_offset_m) const;
   [[nodiscard]] Gauge gauge() const { return gauge_; }
   [[nodiscard]] std::span<const Vector3> tool_offsets_m() const { return tool_offsets_m_; }
   [[nodiscard]] const ValidityVolume& validity() const { return validity_; }
@@ -204,6 +218,7 @@ class VolumetricModel {
   Eigen::MatrixXd cov_Z_;
   ValidityVolume validity_;
   std::optional<TravelForm> travel_;
+  std::optional<Misfit> misfit_;
 };
 
 }  // namespace abbe::calib

@@ -73,7 +73,7 @@ struct Alternative {
 /// without the best-fit rigid motion.
 struct CorrectionSize {
   double V_m = 0.0;
-  double u_m = 0.0;  ///< standard uncertainty of V: root of the trace
+  double u_m = 0.0;  ///< standard uncertainty of V without misfit: root of the trace
 };
 [[nodiscard]] CorrectionSize correction_size(const Observations&, const Solution&);
 

@@ -15,7 +15,8 @@
 /// F.2.4.5). The same for a largest |value|. A range that is not several times as large as its U is an upper limit, not an
 /// estimate. The mean and the rms of |V| are raised likewise; they have no u.
 /// Not contained: the scatter of repeated approaches (a model has no repetitions, so the A, R and
-/// s of ISO 230-2 cannot be computed), errors between the nodes, and changes after the measurement.
+/// s of ISO 230-2 cannot be computed), errors between the nodes beyond the misfit of the model
+/// (misfit.hpp), and changes after the measurement.
 ///
 /// Pure; any thread. Lengths in m, angles in rad, u: standard uncertainty (k = 1).
 
@@ -83,7 +84,7 @@ struct Straightness {
 ///     EC0Y = -s_y(V_x) - s_x(V_y)     Y relative to X
 ///     EB0Z = +s_z(V_x) + s_x(V_z)     Z relative to X
 ///     EA0Z = -s_z(V_y) - s_y(V_z)     Z relative to Y
-/// In gauge G1 the squareness parameters of a model refer to the lines between the end points of
+/// In gauge G2 the squareness parameters of a model refer to the lines between the end points of
 /// the straightness tables; they differ from these values by the slopes of these tables.
 struct Squareness {
   std::string name;
@@ -142,9 +143,9 @@ struct VolumeError {
   /// after compensation is below it with a probability of 95 % (one uncertain direction) to 99 %
   /// (three alike).
   double mean_U_m = 0.0, max_U_m = 0.0;
-};
   /// U(V) without the rigid motion that fits best to the lattice: of the shape of V alone.
   double rigid_free_mean_U_m = 0.0, rigid_free_max_U_m = 0.0;
+};
 [[nodiscard]] Result<VolumeError> volume_error(const VolumetricModel&);
 
 }  // namespace abbe::calib::iso

@@ -24,7 +24,8 @@
 /// unknown with the column C (its derivative) and the residuals r:
 ///     S = C^T W^2 C - C^T W^2 A Q A^T W^2 C,   d = C^T W^2 r / (S + 1/u^2)
 ///     U changes by -Q A^T W^2 C d
-/// The drift of the tracker (tracker_drift.hpp) enters as further columns C, with the information of
+/// Errors of the machine that depend on two axes (two_axis_errors.hpp) are nine more such columns if
+/// the residuals show them. The drift of the tracker (tracker_drift.hpp) enters as further columns C, with the information of
 /// the visits of nests and the prior in place of 1/u^2.
 ///
 /// VolumetricModel lists what is not estimable. Rank and condition refer to the column-scaled data,
@@ -41,6 +42,7 @@
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/encoder_log.hpp"
 #include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/otf/two_axis_errors.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
 namespace abbe::calib::otf {
@@ -63,7 +65,7 @@ struct RowInformation {
 [[nodiscard]] RowInformation information_of(
     const Observations&, const std::function<bool(const Observation&)>& take = {});
 
-/// Parameters U in gauge G1, with their covariance caused by the noise of the rows. With
+/// Parameters U in gauge G2, with their covariance caused by the noise of the rows. With
 /// Observations::smoothness `rank` is that of Statistics.
 using Adjustment = estimation::DatumSolution;
 /// RankDeficient if the rank defect of the data is larger than the number of gauge conditions. The
@@ -140,26 +142,45 @@ struct Synchronisation {
   double sigma_factor = 1.0;
 };
 
+/// The fit of which the model was made, for with_misfit().
+struct FitOfRows {
+  Eigen::VectorXd U;                    ///< of all unknowns of Observations
+  std::vector<double> residual_m;       ///< of the rows, without range offset and drift
+  Eigen::MatrixXd covariance_of_noise;  ///< of U, as far as the noise of the rows causes it
+  /// Over which the noise is correlated, s; for blocks without times in units of a block.
+  double correlation_time = 0.0;
+  std::optional<TwoAxisErrors> two_axes{};
+};
+
 struct Solution {
   Estimator estimator = Estimator::TwoStep;
-  VolumetricModel model;            ///< gauge G1, no rigid unknowns, mean of both directions
+  VolumetricModel model;            ///< gauge G2, no rigid unknowns, mean of both directions
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::VectorXd clock{};  ///< corrections of the clock unknowns, if the observations have them
   Eigen::MatrixXd covariance_with_rigid;  ///< of all unknowns of Observations
   Adjustment adjustment;                  ///< of the rows alone: white noise, no range offset
   RigidTransform T_machine_tracker;
   Statistics statistics;
-  Residuals residuals;  ///< after_m: model, range offset and drift subtracted
+  /// after_m: model, range offset, drift and errors of two axes subtracted
+  Residuals residuals;
   RangeOffset range_offset;
+  std::optional<TwoAxisErrors> two_axes{};           ///< not in the model; part of its misfit
   std::optional<Synchronisation> synchronisation{};  ///< with scale readings
   std::vector<Backlash> backlash{};                  ///< with Options::backlash
   std::optional<TrackerDrift> drift{};               ///< with Options::nests
   std::optional<Smoothness> smoothness{};            ///< with Options::smoothness
   /// With Noise::u_range_offset_m; not with nests, where it is estimated beside the drift.
   std::optional<OffsetInModel> offset_in_model{};
+  FitOfRows fit{};
 };
-/// The observations that result without the estimated range offset and the drift of the tracker.
+/// The observations that result without the estimated range offset, the drift of the tracker and the
+/// errors of two axes.
 [[nodiscard]] Observations without_run_effects(Observations, const Solution&);
+
+/// The solution with the misfit that the residuals show (VolumetricModel::misfit()), in the
+/// covariance of the model, too. The notes of the observations describe it. Unchanged without
+/// misfit.
+[[nodiscard]] Result<Solution> with_misfit(Solution, Observations&);
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});
 /// The same with information_of() all rows, where it is known.

@@ -1,0 +1,84 @@
+// The part of VolumetricModel that contains the misfit.
+#include <algorithm>
+#include <utility>
+
+#include "abbe/calib/basis.hpp"
+#include "abbe/calib/volumetric_model.hpp"
+#include "mean_misfit.hpp"
+#include "message.hpp"
+#include "rigid_body_effects.hpp"
+
+namespace abbe::calib {
+namespace {
+
+Result<void> check(const Misfit& misfit, const VolumetricModel& model) {
+  const Eigen::Index n = misfit.u_of_parameters.size();
+  const Eigen::Index wanted = model.tables() == nullptr ? 0 : model.U().size();
+  if (n != 0 && n != wanted) {
+    return failure(ErrorCode::BadInput,
+                   message("model: misfit of ", n, " parameters, the model has ", wanted));
+  }
+  if (!misfit.u_of_parameters.allFinite() || !misfit.u_V_m.allFinite()) {
+    return failure(ErrorCode::NotFinite, "model: a misfit is not a number");
+  }
+  if ((n > 0 && misfit.u_of_parameters.minCoeff() < 0.0) || misfit.u_V_m.minCoeff() < 0.0 ||
+      !(misfit.table_length_m >= 0.0) || !(misfit.V_length_m >= 0.0)) {
+    return failure(ErrorCode::BadInput, "model: a misfit is negative");
+  }
+  return {};
+}
+
+/// Linear between the nodes, that of the nearest node beyond them.
+double at(std::span<const double> nodes_m, const double* u, double q_m) {
+  const BasisRow row = basis_row(nodes_m, std::clamp(q_m, nodes_m.front(), nodes_m.back()));
+  return row.weight[0] * u[row.first] + row.weight[1] * u[row.first + 1];
+}
+
+}  // namespace
+
+Result<VolumetricModel> VolumetricModel::with_misfit(Misfit misfit) const {
+  if (Result<void> valid = check(misfit, *this); !valid) {
+    return tl::unexpected(valid.error());
+  }
+  VolumetricModel model = *this;
+  model.misfit_.reset();
+  if (misfit.any()) {
+    model.misfit_ = std::move(misfit);
+  }
+  return model;
+}
+
+Matrix3 VolumetricModel::misfit_cov_V_m2(const Vector3& axis_position_m,
+                                         const Vector3& tool_offset_m) const {
+  if (!misfit_) {
+    return Matrix3::Zero();
+  }
+  Matrix3 cov_m2 = misfit_->u_V_m.cwiseAbs2().asDiagonal();
+  if (misfit_->u_of_parameters.size() == 0) {
+    return cov_m2;
+  }
+
+  const ParameterLayout& layout = tables()->layout();
+  const std::array<Vector3, 3> levers =
+      levers_m(layout.chain(), axis_position_m, lever_offset_m(tool_offset_m));
+  for (const Table& table : layout.tables()) {
+    const std::size_t a = index(table.motion.axis);
+    const double m = at(layout.nodes()[a].nodes_m, misfit_->u_of_parameters.data() + table.offset,
+                        axis_position_m(static_cast<Eigen::Index>(a)));
+    if (m > 0.0) {
+      const Vector3 moved_m = m * effect(table.motion, levers[a]);
+      cov_m2 += moved_m * moved_m.transpose();
+    }
+  }
+  return cov_m2;
+}
+
+double mean_misfit_m2(const VolumetricModel& model, std::span<const Vector3> places_m) {
+  double sum_m2 = 0.0;
+  for (const Vector3& q : places_m) {
+    sum_m2 += model.misfit_cov_V_m2(q, model.tool_offsets_m().front()).trace();
+  }
+  return sum_m2 / std::max(1.0, static_cast<double>(places_m.size()));
+}
+
+}  // namespace abbe::calib

@@ -119,7 +119,7 @@ TEST(JointIdentification, NamesFaultsOfTables) {
 
 TEST(JointIdentification, NamesFaultsOfTheArray) {
   const OneMachine longer(1, {.length_error = 200e-6});
-  EXPECT_THAT(longer.with_array(longer.array), HasSubstr("lengths of array"));
+  EXPECT_THAT(longer.with_array(longer.array), HasSubstr("array: its lengths are smaller by"));
 
   const OneMachine m(1);
   abbe::calib::evemu::Observations other_tool = m.array;

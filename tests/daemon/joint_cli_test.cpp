@@ -184,6 +184,8 @@ TEST_F(JointCli, PartsThatAgreeGiveAModelThatIsNowhereLessCertain) {
     EXPECT_FALSE(pair["contradiction"]);
     EXPECT_GT(pair["dof"], 10);
   }
+  EXPECT_EQ(summary["directed"].size(), 3u * 7u);
+  for (const auto& test : summary["directed"]) EXPECT_FALSE(test["contradiction"]);
   for (const auto& part : summary["parts"]) {
     EXPECT_GE(part["u_without_um"].get<double>(), summary["u_um"].get<double>());
     if (part["method"] == "otf") {
@@ -193,10 +195,11 @@ TEST_F(JointCli, PartsThatAgreeGiveAModelThatIsNowhereLessCertain) {
   for (const auto& table : summary["tables"])
     for (const auto& u_of_run : table["u_of_runs"])
       EXPECT_LE(table["u"].get<double>(), u_of_run.get<double>() * (1.0 + 1e-9));
-  EXPECT_THAT(text_of(folder_ / "out/report.html"),
-              AllOf(HasSubstr("Do the parts agree?"), HasSubstr("behind"), Not(HasSubstr("src=")),
-                    HasSubstr("no residuals of its own"), Not(HasSubstr("before the fit")),
-                    HasSubstr("error at legs excluded from the fit")));
+  EXPECT_THAT(
+      text_of(folder_ / "out/report.html"),
+      AllOf(HasSubstr("Do the parts agree?"), HasSubstr("scale of X, um/m"), HasSubstr("behind"),
+            Not(HasSubstr("src=")), HasSubstr("no residuals of its own"),
+            Not(HasSubstr("before the fit")), HasSubstr("error at legs excluded from the fit")));
 }
 
 TEST_F(JointCli, TheReportOfAKeptModelIsMadeAgainFromTheStore) {
@@ -272,6 +275,19 @@ TEST_F(JointCli, AWrongUnitIsNamed) {
   write("inch.csv", joint_errors_csv(*array_, 1.0 / 25.4));
   expect_refused(identify(kFrontRun + errors_of("inch.csv"), "none"), 1,
                  "the errors of array are too small by a factor of 25.4 (unit)");
+}
+
+/// A length that is wrong by 100 um/m, as of an array that is 9 K warmer than stated.
+TEST_F(JointCli, AWrongLengthOfTheArrayIsNamedWithItsValue) {
+  auto longer = *array_;
+  for (auto& row : longer.rows) row.V_m += 100e-6 * row.reading_m;
+  write("longer.csv", joint_errors_csv(longer, 1.0));
+  const auto ran = identify(kFrontRun + errors_of("longer.csv"), "none", "--json");
+  expect_refused(ran, 1, "array: its lengths are larger by ");
+  EXPECT_THAT(ran.err, HasSubstr("than those of front: wrong length or temperature of the array"));
+  const auto length = nlohmann::json::parse(ran.out)["directed"][0];
+  EXPECT_EQ(length["direction"], "length");
+  EXPECT_NEAR(length["difference"].get<double>(), 100.0, 4.0 * length["u"].get<double>());
 }
 
 TEST_F(JointCli, ARunOfAnotherMachineIsRefused) {

@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 #include <iomanip>
-#include <limits>
+#include <optional>
 #include <sstream>
 #include <utility>
 
-#include "axis_scale_columns.hpp"
 #include "chi2_tail.hpp"
 #include "elementary.hpp"
+#include "joint/directed.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -30,10 +30,11 @@ bool agrees(const Disagreement& d, double least) {
   return d.dof == 0 || d.log_p > natural_logarithm(least);
 }
 
-struct Hypothesis {
-  std::string text;
-  Disagreement left;
-};
+/// The best ones first.
+void sort_by_fit(std::vector<Explanation>& all) {
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Explanation& a, const Explanation& b) { return a.log_p < b.log_p; });
+}
 
 DeterminingRows with_reversed_sign(DeterminingRows rows) {
   rows.z = -rows.z;
@@ -80,49 +81,71 @@ class Hypotheses {
 
   void add_mistakes_of_methods() {
     for (const Mistake& m : i_.mistakes ? i_.mistakes() : std::vector<Mistake>{}) {
-      test(i_.name + ": " + m.text, pair_.rows(i_, m.information), pair_.of_j());
+      const double given = pair_.squares(pair_.rows(i_, m.as_given), pair_.of_j());
+      test(i_.name + ": " + m.text, pair_.rows(i_, m.information), pair_.of_j(), given);
     }
     for (const Mistake& m : j_.mistakes ? j_.mistakes() : std::vector<Mistake>{}) {
-      test(j_.name + ": " + m.text, pair_.of_i(), pair_.rows(j_, m.information));
+      const double given = pair_.squares(pair_.of_i(), pair_.rows(j_, m.as_given));
+      test(j_.name + ": " + m.text, pair_.of_i(), pair_.rows(j_, m.information), given);
     }
   }
 
-  /// The likely ones, most likely first.
-  [[nodiscard]] std::vector<std::string> texts() {
-    std::stable_sort(found_.begin(), found_.end(), [](const Hypothesis& a, const Hypothesis& b) {
-      return a.left.log_p > b.left.log_p;
-    });
-    std::vector<std::string> texts;
-    for (std::size_t k = 0; k < std::min(kMostExplanations, found_.size()); ++k) {
-      texts.push_back(found_[k].text);
-    }
-    return texts;
+  /// The best ones.
+  [[nodiscard]] std::vector<Explanation> best() {
+    sort_by_fit(found_);
+    found_.resize(std::min(kMostExplanations, found_.size()));
+    return found_;
   }
 
  private:
   void test(std::string text, const DeterminingRows& i, const DeterminingRows& j) {
-    const Disagreement left = pair_.disagreement(i, j);
-    if (agrees(left, least_)) {
-      found_.push_back({std::move(text), left});
+    test(std::move(text), i, j, given_);
+  }
+  /// `given`: squares of the parts as given. A hypothesis must fit better.
+  void test(std::string text, const DeterminingRows& i, const DeterminingRows& j, double given) {
+    const double log_p = log_chi2_tail(given - pair_.squares(i, j), 1);
+    if (log_p < 0.0 && agrees(pair_.disagreement(i, j), least_)) {
+      found_.push_back({std::move(text), log_p});
     }
   }
 
   const PairProblem& pair_;
   const Part &i_, &j_;
   double least_ = 0.0;
-  std::vector<Hypothesis> found_;
+  double given_ = pair_.squares(pair_.of_i(), pair_.of_j());
+  std::vector<Explanation> found_;
 };
 
-/// All lengths of j larger than those of i by one factor.
-void explain_by_length(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
-                       const GaugeCoordinates& c, const ParameterLayout& layout) {
-  const Eigen::VectorXd column = c.N.transpose() * axis_scale_columns(layout).rowwise().sum();
-  const PairProblem::Freed freed = pair.freed(column);
-  if (freed.drop_dof == 1 && agrees(freed.left, least_likely(test))) {
-    test.explanations.push_back(
-        message("lengths of ", j.name, " are larger than those of ", i.name, " by ",
-                freed.d(0) * kUmPerM, " um/m (u ", freed.root_cov_d.norm() * kUmPerM,
-                " um/m): temperature, expansion or unit of a length, ranges of the tracker"));
+/// "lengths of j are larger than those of i by 20.3 um/m (u 1.7 um/m)".
+std::string text_of(const Direction& direction, const PairProblem::Freed& freed, const Part& i,
+                    const Part& j) {
+  const std::string size =
+      message(" by ", freed.d(0) * kUmPerM, direction.is_angle ? " urad (u " : " um/m (u ",
+              freed.root_cov_d.norm() * kUmPerM, direction.is_angle ? " urad)" : " um/m)");
+  if (direction.name == kLength) {
+    return message("lengths of ", j.name, " are larger than those of ", i.name, size,
+                   ": temperature, expansion or unit of a length, ranges of the tracker");
+  }
+  return message("the ", direction.name, " of ", j.name, " is larger than that of ", i.name, size);
+}
+
+/// The difference in one direction that fits best.
+void explain_by_directions(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
+                           const GaugeCoordinates& c, const ParameterLayout& layout) {
+  std::optional<Explanation> best;
+  double best_excess = 0.0;  // beyond the limit, as in the directed tests
+  for (const Direction& direction : directions(c, layout)) {
+    const PairProblem::Freed freed = pair.freed(direction.column);
+    const double log_p = log_chi2_tail(freed.drop, 1);
+    const double excess = natural_logarithm(direction.share) - log_p;
+    if (freed.drop_dof == 1 && agrees(freed.left, least_likely(test)) &&
+        (!best || excess > best_excess)) {
+      best = Explanation{text_of(direction, freed, i, j), log_p};
+      best_excess = excess;
+    }
+  }
+  if (best) {
+    test.explanations.push_back(*std::move(best));
   }
 }
 
@@ -217,7 +240,8 @@ void explain_by_tables(PairTest& test, const PairProblem& pair, const GaugeCoord
     first += tables[k]->size;
   }
   if (explained) {
-    test.explanations.push_back("they differ in " + names);
+    const double log_p = freed.drop_dof > 0 ? log_chi2_tail(freed.drop, freed.drop_dof) : 0.0;
+    test.explanations.push_back({"they differ in " + names, log_p});
   }
 }
 
@@ -238,9 +262,10 @@ void explain(PairTest& test, const PairProblem& pair, const Part& i, const Part&
   mistakes.add_signs(c);
   mistakes.add_units();
   mistakes.add_mistakes_of_methods();
-  test.explanations = mistakes.texts();
-  explain_by_length(test, pair, i, j, c, layout);
+  test.explanations = mistakes.best();
+  explain_by_directions(test, pair, i, j, c, layout);
   explain_by_tables(test, pair, c, layout);
+  sort_by_fit(test.explanations);
 }
 
 }  // namespace abbe::calib::joint

@@ -10,6 +10,7 @@
 #include "elementary.hpp"
 #include "gauge_coordinates.hpp"
 #include "joint/determining_rows.hpp"
+#include "joint/directed.hpp"
 #include "joint/explanations.hpp"
 #include "joint/pair_problem.hpp"
 #include "message.hpp"
@@ -66,6 +67,18 @@ Result<void> check_parts(std::span<const Part> parts, const CommonTables& common
   return check_same_effects(parts);
 }
 
+Result<void> check_test(std::span<const Part> parts, const CommonTables& common,
+                        const JointOptions& options) {
+  if (Result<void> valid = check_parts(parts, common, 2); !valid) {
+    return valid;
+  }
+  if (!(options.false_alarm > 0.0 && options.false_alarm < 1.0)) {
+    return failure(ErrorCode::BadInput, message("joint identification: false-alarm probability ",
+                                                options.false_alarm, " must be in (0, 1)"));
+  }
+  return {};
+}
+
 /// The union of the effects, in the order in which parts name them.
 std::vector<std::string> all_effects(std::span<const Part> parts) {
   std::vector<std::string> all;
@@ -102,9 +115,43 @@ std::string text_of(const PairTest& t, std::span<const Part> parts) {
     }
   }
   for (std::size_t k = 0; k < t.explanations.size(); ++k) {
-    text += (k == 0 ? "; they agree if: " : "; or: ") + t.explanations[k];
+    text += (k == 0 ? "; they agree if: " : "; or: ") + t.explanations[k].text;
   }
   return text;
+}
+
+/// The directed test that is farthest beyond its limit.
+const DirectedFinding* most_significant(const std::vector<DirectedFinding>& findings) {
+  const auto excess = [](const DirectedFinding& f) {
+    return natural_logarithm(f.test.limit) - f.log_p;
+  };
+  const DirectedFinding* best = nullptr;
+  for (const DirectedFinding& f : findings) {
+    const bool better = best == nullptr || excess(f) > excess(*best);
+    best = f.test.contradiction && better ? &f : best;
+  }
+  return best;
+}
+
+/// See JointIdentification::contradictions.
+std::vector<std::string> contradictions_of(const std::vector<PairTest>& pairs,
+                                           const std::vector<DirectedFinding>& findings,
+                                           std::span<const Part> parts) {
+  constexpr double kRounding = 1e-6;  // of a pair, the same direction can be the best explanation
+  const DirectedFinding* directed = most_significant(findings);
+  bool first = directed != nullptr && directed->test.explains;
+  std::vector<std::string> texts;
+  for (const PairTest& pair : pairs) {
+    if (pair.contradiction) {
+      texts.push_back(text_of(pair, parts));
+      first = first && (pair.explanations.empty() ||
+                        pair.explanations.front().log_p >= (1.0 + kRounding) * directed->log_p);
+    }
+  }
+  if (directed != nullptr && (first || texts.empty())) {
+    texts.insert(texts.begin(), text(directed->test, parts));
+  }
+  return texts;
 }
 
 /// Without the interior points of large parts.
@@ -120,17 +167,13 @@ Result<ValidityVolume> validity_of(std::span<const Part> parts) {
 
 Result<std::vector<PairTest>> test_pairs(std::span<const Part> parts, const CommonTables& common,
                                          const JointOptions& options) {
-  if (Result<void> valid = check_parts(parts, common, 2); !valid) {
+  if (Result<void> valid = check_test(parts, common, options); !valid) {
     return tl::unexpected(valid.error());
-  }
-  if (!(options.false_alarm > 0.0 && options.false_alarm < 1.0)) {
-    return failure(ErrorCode::BadInput, message("joint identification: false-alarm probability ",
-                                                options.false_alarm, " must be in (0, 1)"));
   }
 
   const GaugeCoordinates c = gauge_coordinates(common.basis);
   const double pairs = 0.5 * static_cast<double>(parts.size() * (parts.size() - 1));
-  const double limit = options.false_alarm / pairs;
+  const double limit = kShareOfPairs * options.false_alarm / pairs;
   std::vector<PairTest> tests;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     for (std::size_t j = i + 1; j < parts.size(); ++j) {
@@ -199,6 +242,20 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
   return joint;
 }
 
+Result<std::vector<DirectedTest>> test_directions(std::span<const Part> parts,
+                                                  const CommonTables& common,
+                                                  const JointOptions& options) {
+  if (Result<void> valid = check_test(parts, common, options); !valid) {
+    return tl::unexpected(valid.error());
+  }
+  std::vector<DirectedTest> tests;
+  for (DirectedFinding& f : directed_findings(parts, gauge_coordinates(common.basis),
+                                              common.basis.layout(), options.false_alarm)) {
+    tests.push_back(std::move(f.test));
+  }
+  return tests;
+}
+
 Result<JointIdentification> identify(std::span<const Part> parts, const CommonTables& common,
                                      const JointOptions& options) {
   Result<std::vector<PairTest>> pairs = test_pairs(parts, common, options);
@@ -206,11 +263,13 @@ Result<JointIdentification> identify(std::span<const Part> parts, const CommonTa
     return tl::unexpected(pairs.error());
   }
 
-  JointIdentification result{.pairs = *std::move(pairs), .joint = {}, .contradictions = {}};
-  for (const PairTest& pair : result.pairs) {
-    if (pair.contradiction) {
-      result.contradictions.push_back(text_of(pair, parts));
-    }
+  const std::vector<DirectedFinding> findings = directed_findings(
+      parts, gauge_coordinates(common.basis), common.basis.layout(), options.false_alarm);
+  JointIdentification result{
+      .pairs = *std::move(pairs), .directed = {}, .joint = {}, .contradictions = {}};
+  result.contradictions = contradictions_of(result.pairs, findings, parts);
+  for (const DirectedFinding& f : findings) {
+    result.directed.push_back(f.test);
   }
   if (!result.contradictions.empty()) {
     return result;

@@ -2,10 +2,10 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "chi2_tail.hpp"
+#include "joint/noise_factor.hpp"
 
 namespace abbe::calib::joint {
 namespace {
@@ -20,20 +20,6 @@ std::vector<std::string> shared_effects(const Part& i, const Part& j) {
   return shared;
 }
 
-/// The factor by which the variance of the noise exceeds its estimate with a probability of 2 %:
-/// dof divided by the 2 % quantile of chi-square with dof degrees of freedom, in the approximation
-/// of [Wilson 1931], which is wrong for a dof of 1 or 2: the factor is at most 1000.
-double variance_may_be(const Part& part) {
-  if (!(part.dof_of_noise > 0.0)) {
-    return 1.0;
-  }
-  constexpr double kNormalQuantile = 2.054;  // exceeded with a probability of 2 %
-  constexpr double kLeastRoot = 0.1;
-  const double s = 2.0 / (9.0 * part.dof_of_noise);
-  const double root = std::max(1.0 - s - kNormalQuantile * std::sqrt(s), kLeastRoot);
-  return 1.0 / (root * root * root);
-}
-
 }  // namespace
 
 PairProblem::PairProblem(const Part& i, const Part& j, const GaugeCoordinates& c)
@@ -41,7 +27,12 @@ PairProblem::PairProblem(const Part& i, const Part& j, const GaugeCoordinates& c
       shared_(shared_effects(i, j)),
       i_(in_coordinates(i.information, i.effects, N_, shared_)),
       j_(in_coordinates(j.information, j.effects, N_, shared_)),
-      noise_factor_(std::max(variance_may_be(i), variance_may_be(j))) {}
+      noise_factor_(std::max(variance_may_be(i.dof_of_noise), variance_may_be(j.dof_of_noise))) {}
+
+double PairProblem::squares(const DeterminingRows& i, const DeterminingRows& j) const {
+  const Minimum both = minimum(i, j, Eigen::MatrixXd(N_.cols(), 0));
+  return (both.sum.rest() + i.rest + j.rest) / noise_factor_;
+}
 
 DeterminingRows PairProblem::rows(const Part& part, const estimation::Information& data) const {
   return in_coordinates(data, part.effects, N_, shared_);

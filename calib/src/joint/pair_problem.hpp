@@ -28,6 +28,10 @@ class PairProblem {
   [[nodiscard]] Disagreement disagreement() const { return disagreement(i_, j_); }
   [[nodiscard]] Disagreement disagreement(const DeterminingRows& i, const DeterminingRows& j) const;
 
+  /// The minimum of both together, with that of each part alone (DeterminingRows::rest): -2 times
+  /// the logarithm of the likelihood, except for a constant.
+  [[nodiscard]] double squares(const DeterminingRows& i, const DeterminingRows& j) const;
+
   /// The minimum if j observes e + `free` d with any d.
   struct Freed {
     Disagreement left;

@@ -17,27 +17,52 @@ namespace {
 
 /// The unknowns of the blocks: parameters, effects of the scales, left-out rotations, errors of the
 /// array.
-struct ArrayUnknowns {
-  const CommonTables& common;
-  const LeftOutRotations& left_out;
-  Eigen::MatrixXd scales;  ///< columns of the effects of the scales
-
-  [[nodiscard]] std::size_t model() const { return common.basis.size(); }
-  [[nodiscard]] std::size_t first_left_out() const {
-    return model() + static_cast<std::size_t>(scales.cols());
+class ArrayUnknowns {
+ public:
+  ArrayUnknowns(const evemu::Observations& o, const CommonTables& common,
+                const ArrayOptions& options)
+      : common_(common), left_out_(common, o.machine.tool_offset_m - common.tool_offset_m) {
+    const Eigen::MatrixX3d of_axis = axis_scale_columns(common.basis.layout());
+    scales_.resize(of_axis.rows(), 0);
+    for (const Axis a : kAllAxes) {
+      if (const double u = options.effects.u_axis_scale[index(a)]; u > 0.0) {
+        scales_.conservativeResize(Eigen::NoChange, scales_.cols() + 1);
+        scales_.rightCols<1>() = u * of_axis.col(static_cast<Eigen::Index>(index(a)));
+        effects_.push_back(message("scale of ", letter(a)));
+        u_of_effects_.push_back(u);
+      }
+    }
+    for (const evemu::ArtefactError& error : evemu::artefact_errors(o)) {
+      effects_.push_back(error.name + " of " + options.array);
+      u_of_effects_.push_back(error.u);
+    }
   }
-  [[nodiscard]] std::size_t first_error() const { return first_left_out() + left_out.size(); }
+
+  [[nodiscard]] const CommonTables& common() const { return common_; }
+  [[nodiscard]] std::size_t first_left_out() const {
+    return common_.basis.size() + static_cast<std::size_t>(scales_.cols());
+  }
+  [[nodiscard]] std::size_t first_error() const { return first_left_out() + left_out_.size(); }
+  [[nodiscard]] const std::vector<std::string>& effects() const { return effects_; }
+  [[nodiscard]] const std::vector<double>& u_of_effects() const { return u_of_effects_; }
 
   [[nodiscard]] evemu::VolumetricDesign design(const Vector3& tool_offset_m) const {
     const evemu::VolumetricDesign of_tables =
-        evemu::design_of(estimation::ModelBasis(common.basis), tool_offset_m);
+        evemu::design_of(estimation::ModelBasis(common_.basis), tool_offset_m);
     return {first_error(), [this, of_tables](const Vector3& reading_m) {
               const Eigen::Matrix3Xd B = of_tables.B(reading_m);
               Eigen::Matrix3Xd all(3, static_cast<Eigen::Index>(first_error()));
-              all << B, B * scales, left_out.B(reading_m);
+              all << B, B * scales_, left_out_.B(reading_m);
               return all;
             }};
   }
+
+ private:
+  const CommonTables& common_;
+  LeftOutRotations left_out_;
+  Eigen::MatrixXd scales_;  ///< columns of the effects of the scales
+  std::vector<std::string> effects_;
+  std::vector<double> u_of_effects_;
 };
 
 std::vector<std::size_t> counted(std::size_t first, std::size_t end) {
@@ -51,7 +76,7 @@ Result<estimation::Information> information_of_array(const evemu::Observations& 
                                                      const ArrayUnknowns& unknowns, double s_m,
                                                      const Eigen::VectorXd& U) {
   evemu::PoseBlockOptions options{.s_m = s_m};
-  const estimation::ModelBasis basis(unknowns.common.basis);
+  const estimation::ModelBasis basis(unknowns.common().basis);
   if (U.size() > 0) {
     options.V_at_m = [&](const Vector3& reading_m) {
       return basis.V_m({.q_m = reading_m, .tool_offset_m = o.machine.tool_offset_m},
@@ -132,8 +157,8 @@ struct ChangedArray {
   evemu::Observations observations;
 };
 
-/// What is often wrong with errors of balls: axes of V, or of readings and V; the stylus.
-std::vector<ChangedArray> changed_arrays(const evemu::Observations& o, const CommonTables& common) {
+/// What is often wrong with errors of balls: axes of V, or of readings and V.
+std::vector<ChangedArray> changed_axes(const evemu::Observations& o, const CommonTables& common) {
   std::vector<ChangedArray> changed;
   for (const AxisMistake& mistake : axis_mistakes()) {
     changed.push_back({"the errors have " + mistake.text,
@@ -144,6 +169,12 @@ std::vector<ChangedArray> changed_arrays(const evemu::Observations& o, const Com
     }
   }
 
+  return changed;
+}
+
+/// A wrong stylus.
+std::vector<ChangedArray> changed_tools(const evemu::Observations& o, const CommonTables& common) {
+  std::vector<ChangedArray> changed;
   const Vector3& t = o.machine.tool_offset_m;
   for (const Vector3& other : {Vector3(-t), Vector3(Vector3::Zero()), common.tool_offset_m}) {
     if ((other - t).norm() > VolumetricModel::kToolTolerance_m) {
@@ -156,59 +187,48 @@ std::vector<ChangedArray> changed_arrays(const evemu::Observations& o, const Com
   return changed;
 }
 
+/// The noise that was stated, or that of the residuals.
+Result<ArrayNoise> noise_of_array(const evemu::Observations& o, const CommonTables& common,
+                                  const ArrayOptions& options) {
+  if (options.s_m > 0.0) {
+    return ArrayNoise{options.s_m, 0.0};
+  }
+  const ArrayUnknowns unknowns(o, common, options);
+  constexpr int kRepeats = 3;  // s and the errors of the array are separated by their priors
+  ArrayNoise noise{1e-6, 0.0};
+  for (int i = 0; i < kRepeats; ++i) {
+    Result<ArrayNoise> next =
+        information_of_array(o, unknowns, noise.s_m, options.linearised_at)
+            .and_then([&](const estimation::Information& information) {
+              return residual_noise_of_array(information, unknowns.first_error(), noise.s_m,
+                                             options.most_s_m);
+            });
+    if (!next) {
+      return next;
+    }
+    noise = *next;
+  }
+  return noise;
+}
+
 /// The information of a part about parameters, effects of the scales and errors of the array; the
 /// left-out rotations may have any value.
 Result<Part> array_part(const evemu::Observations& o, const CommonTables& common,
-                        const ArrayOptions& options, double s_m) {
-  const LeftOutRotations left_out(common, o.machine.tool_offset_m - common.tool_offset_m);
-  const Eigen::MatrixX3d of_axis = axis_scale_columns(common.basis.layout());
-  ArrayUnknowns unknowns{common, left_out, Eigen::MatrixXd(of_axis.rows(), 0)};
-  std::vector<std::string> effects;
-  std::vector<double> u_of_effects;
-  for (const Axis a : kAllAxes) {
-    if (const double u = options.effects.u_axis_scale[index(a)]; u > 0.0) {
-      unknowns.scales.conservativeResize(Eigen::NoChange, unknowns.scales.cols() + 1);
-      unknowns.scales.rightCols<1>() = u * of_axis.col(static_cast<Eigen::Index>(index(a)));
-      effects.push_back(message("scale of ", letter(a)));
-      u_of_effects.push_back(u);
-    }
-  }
-
-  double dof = 0.0;
-  if (!(s_m > 0.0)) {
-    constexpr int kRepeats = 3;  // s and the errors of the array are separated by their priors
-    s_m = 1e-6;
-    for (int i = 0; i < kRepeats; ++i) {
-      const Result<ArrayNoise> noise =
-          information_of_array(o, unknowns, s_m, options.linearised_at)
-              .and_then([&](const estimation::Information& information) {
-                return residual_noise_of_array(information, unknowns.first_error(), s_m,
-                                               options.most_s_m);
-              });
-      if (!noise) {
-        return tl::unexpected(noise.error());
-      }
-      s_m = noise->s_m, dof = noise->dof;
-    }
-  }
-
+                        const ArrayOptions& options, const ArrayNoise& noise) {
+  const ArrayUnknowns unknowns(o, common, options);
   Result<estimation::Information> all =
-      information_of_array(o, unknowns, s_m, options.linearised_at);
+      information_of_array(o, unknowns, noise.s_m, options.linearised_at);
   if (!all) {
     return tl::unexpected(all.error());
   }
-  for (const evemu::ArtefactError& error : evemu::artefact_errors(o)) {
-    effects.push_back(error.name + " of " + options.array);
-    u_of_effects.push_back(error.u);
-  }
-  if (left_out.size() > 0) {
+  if (unknowns.first_error() > unknowns.first_left_out()) {
     all = all->without_unknowns(counted(unknowns.first_left_out(), unknowns.first_error()));
   }
   return Part{.method = "evemu",
               .information = *std::move(all),
-              .effects = std::move(effects),
-              .u_of_effects = std::move(u_of_effects),
-              .dof_of_noise = dof};
+              .effects = unknowns.effects(),
+              .u_of_effects = unknowns.u_of_effects(),
+              .dof_of_noise = noise.dof};
 }
 
 /// The information with columns of zeros for effects at the end that it does not have.
@@ -219,16 +239,59 @@ estimation::Information with_all_effects(const estimation::Information& some,
   return all;
 }
 
+/// Hypotheses whose observations have the same form, `given` without a mistake. Their noise is that
+/// of the hypothesis that fits best: with a noise of its own, a wrong hypothesis would explain its
+/// own residuals.
+void add_mistakes(std::vector<Mistake>& mistakes, const evemu::Observations& given,
+                  std::vector<ChangedArray> changed, const CommonTables& common,
+                  const ArrayOptions& options, std::size_t unknowns) {
+  Result<ArrayNoise> noise = noise_of_array(given, common, options);
+  std::vector<ChangedArray> possible;
+  for (ChangedArray& of : changed) {
+    if (const Result<ArrayNoise> own = noise_of_array(of.observations, common, options)) {
+      noise = !noise || own->s_m < noise->s_m ? own : noise;
+      possible.push_back(std::move(of));
+    }
+  }
+
+  if (!noise) {
+    return;
+  }
+
+  const auto information = [&](const evemu::Observations& o) {
+    return array_part(o, common, options, *noise).map([&](const Part& part) {
+      return with_all_effects(part.information, unknowns);
+    });
+  };
+  const auto as_given = information(given);
+  for (ChangedArray& of : possible) {
+    if (auto changed_information = information(of.observations); changed_information && as_given) {
+      mistakes.push_back({std::move(of.text), *std::move(changed_information), *as_given});
+    }
+  }
+}
+
 std::vector<Mistake> mistakes_of_array(const evemu::Observations& o, const CommonTables& common,
                                        const ArrayOptions& options, std::size_t unknowns) {
   std::vector<Mistake> mistakes;
-  for (ChangedArray& changed : changed_arrays(o, common)) {
-    // Under another hypothesis the residuals are others: the noise is estimated again.
-    if (Result<Part> part = array_part(changed.observations, common, options, options.s_m)) {
-      mistakes.push_back({std::move(changed.text), with_all_effects(part->information, unknowns)});
+  add_mistakes(mistakes, with_changed_errors(o, Matrix3::Identity(), Matrix3::Identity()),
+               changed_axes(o, common), common, options, unknowns);
+  add_mistakes(mistakes, o, changed_tools(o, common), common, options, unknowns);
+  return mistakes;
+}
+
+/// "; not if the errors have Y reversed": the mistakes without which the noise is small enough.
+std::string mistakes_text(const evemu::Observations& o, const CommonTables& common,
+                          const ArrayOptions& options) {
+  std::vector<std::string> without;
+  for (const auto& changed : {changed_axes(o, common), changed_tools(o, common)}) {
+    for (const ChangedArray& of : changed) {
+      if (noise_of_array(of.observations, common, options)) {
+        without.push_back(of.text);
+      }
     }
   }
-  return mistakes;
+  return without.empty() ? "" : "; not if " + or_list(without);
 }
 
 Result<void> check_array(const evemu::Observations& o, const CommonTables& common) {
@@ -270,17 +333,14 @@ Result<Part> part_of_array(std::string name, const evemu::Observations& o,
     return tl::unexpected(in_this_part(valid.error()));
   }
 
-  Result<Part> part = array_part(o, common, options, options.s_m);
+  Result<Part> part = noise_of_array(o, common, options).and_then([&](const ArrayNoise& noise) {
+    return array_part(o, common, options, noise);
+  });
   if (!part) {
     Error error = in_this_part(part.error());
-    std::vector<std::string> without;
-    for (ChangedArray& changed : changed_arrays(o, common)) {
-      if (part.error().code == ErrorCode::BadInput &&
-          array_part(changed.observations, common, options, options.s_m)) {
-        without.push_back(std::move(changed.text));
-      }
+    if (error.code == ErrorCode::BadInput && !(options.s_m > 0.0)) {
+      error.text += mistakes_text(o, common, options);
     }
-    error.text += without.empty() ? "" : "; not if " + or_list(without);
     return tl::unexpected(std::move(error));
   }
 

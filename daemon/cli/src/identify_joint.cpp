@@ -90,6 +90,7 @@ Result<JointOutcome> judged(const IdentifyJointArguments& arguments, const Joint
   document.run = run_figures(*verdict, "legs");
   JointOutcome outcome{input,
                        std::move(identified.pairs),
+                       std::move(identified.directed),
                        *std::move(identified.joint),
                        std::move(*contributions),
                        std::move(*verdict),
@@ -125,9 +126,10 @@ int run_joint(const IdentifyJointArguments& arguments) {
   if (!identified) return report(error_of(identified.error()));
   if (!identified->joint) {
     if (arguments.json)
-      fmt::print("{}\n", indented_json_text(
-                             nlohmann::json{{"pairs", pairs_json(*input, identified->pairs)},
-                                            {"contradictions", identified->contradictions}}));
+      fmt::print("{}\n", indented_json_text(nlohmann::json{
+                             {"pairs", pairs_json(*input, identified->pairs)},
+                             {"directed", directed_json(*input, identified->directed)},
+                             {"contradictions", identified->contradictions}}));
     return report(contradiction_of(std::move(identified->contradictions)));
   }
 
@@ -158,7 +160,7 @@ void add_joint_options(CLI::App& command, IdentifyJointArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   command
       .add_option("--false-alarm", arguments.false_alarm,
-                  "probability that parts of one machine are refused; all pairs together")
+                  "probability that parts of one machine are refused; all tests together")
       ->check(CLI::Range(1e-12, 0.5))
       ->capture_default_str();
   command.add_flag("--accept-path-orientation", arguments.accept_path_orientation,
@@ -175,9 +177,12 @@ void add_identify_joint(CLI::App& parent, int& exit) {
       "joint",
       "Identify one model from several runs with a laser tracker (also from several places) and\n"
       "ball arrays touched on the same machine. Every pair of parts is tested in what both\n"
-      "determine. Parts that contradict each other give no model (exit code 1); the message names\n"
-      "what explains it: sign, unit, axes, tool, length, tables. Else model.json, tables.csv and\n"
-      "report.html are written to OUT. The model is nowhere less certain than that of a part.\n"
+      "determine, every part in its lengths and squareness. Parts that contradict each other give "
+      "no\n"
+      "model (exit code 1); the message names what explains it: length, squareness, sign, unit,\n"
+      "axes, tool, tables. Else model.json, tables.csv and report.html are written to OUT. The "
+      "model\n"
+      "is nowhere less certain than that of a part.\n"
       "Exit code 5 if the gate would refuse the model; the files are written in any case.");
   add_joint_options(*command, *arguments);
   command->callback([arguments, &exit] { exit = run_joint(*arguments); });

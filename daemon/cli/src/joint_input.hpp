@@ -20,7 +20,7 @@ struct IdentifyJointArguments {
   std::string machine, parts, keep, out;
   std::optional<std::string> estimator;  // of the runs; without a value: that of [otf]
   std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
-  double false_alarm = 1e-3;
+  double false_alarm = calib::joint::JointOptions{}.false_alarm;
   bool scales_corrected = false, accept_path_orientation = false, json = false;
 };
 

@@ -10,6 +10,7 @@
 namespace abbe::daemon {
 namespace {
 
+using calib::joint::DirectedTest;
 using calib::joint::PairTest;
 using calib::joint::TableUncertainty;
 
@@ -108,6 +109,25 @@ RunFigures::Table pairs_table(const JointOutcome& outcome) {
           .rows = std::move(rows)};
 }
 
+std::string unit_of(const DirectedTest& test) {
+  return test.is_angle ? "urad" : "um/m";
+}
+
+RunFigures::Table directed_table(const JointOutcome& outcome) {
+  std::vector<std::vector<std::string>> rows;
+  for (const DirectedTest& test : outcome.directed)
+    rows.push_back(
+        {outcome.input.parts[test.part].name, fmt::format("{}, {}", test.direction, unit_of(test)),
+         fmt::format("{:.3f}", test.difference * kUmPerM), fmt::format("{:.3f}", test.u * kUmPerM),
+         fmt::format("{:.3g}", test.p), fmt::format("{:.3g}", test.limit)});
+  return {.title = "Lengths, scales and squareness of the parts",
+          .explanation =
+              "Difference of a part from all other parts together, with its standard uncertainty. "
+              "p: probability of a larger difference if all describe the same machine.",
+          .columns = {"part", "direction", "difference", "u", "p", "refused below"},
+          .rows = std::move(rows)};
+}
+
 RunFigures::Table uncertainties_table(const JointOutcome& outcome) {
   std::vector<std::string> columns{"rms over the nodes"};
   for (const PartFacts& part : outcome.input.facts)
@@ -127,7 +147,27 @@ RunFigures::Table uncertainties_table(const JointOutcome& outcome) {
           .rows = std::move(rows)};
 }
 
+std::vector<std::string> texts_of(const std::vector<calib::joint::Explanation>& explanations) {
+  std::vector<std::string> texts;
+  for (const auto& explanation : explanations) texts.push_back(explanation.text);
+  return texts;
+}
+
 }  // namespace
+
+nlohmann::json directed_json(const JointInput& input, const std::vector<DirectedTest>& directed) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const DirectedTest& test : directed)
+    all.push_back({{"part", input.parts[test.part].name},
+                   {"direction", test.direction},
+                   {"unit", unit_of(test)},
+                   {"difference", test.difference * kUmPerM},
+                   {"u", test.u * kUmPerM},
+                   {"p", test.p},
+                   {"limit", test.limit},
+                   {"contradiction", test.contradiction}});
+  return all;
+}
 
 nlohmann::json pairs_json(const JointInput& input, const std::vector<PairTest>& pairs) {
   nlohmann::json all = nlohmann::json::array();
@@ -138,7 +178,7 @@ nlohmann::json pairs_json(const JointInput& input, const std::vector<PairTest>& 
                    {"p", pair.all.p},
                    {"limit", pair.all.limit},
                    {"contradiction", pair.contradiction},
-                   {"explanations", pair.explanations}});
+                   {"explanations", texts_of(pair.explanations)}});
   return all;
 }
 
@@ -152,6 +192,7 @@ nlohmann::json joint_json(const JointOutcome& outcome, const std::filesystem::pa
           {"hash", model_hash(outcome.document)},
           {"parts", parts_json(outcome)},
           {"pairs", pairs_json(outcome.input, outcome.pairs)},
+          {"directed", directed_json(outcome.input, outcome.directed)},
           {"u_um", u_of_joint_m(outcome) * kUmPerM},
           {"tables", tables_json(outcome)},
           {"effects", effects},
@@ -181,7 +222,8 @@ void print_joint_summary(const JointOutcome& outcome, const std::filesystem::pat
 }
 
 std::vector<RunFigures::Table> joint_tables(const JointOutcome& outcome) {
-  return {parts_table(outcome), pairs_table(outcome), uncertainties_table(outcome)};
+  return {parts_table(outcome), pairs_table(outcome), directed_table(outcome),
+          uncertainties_table(outcome)};
 }
 
 }  // namespace abbe::daemon

@@ -17,6 +17,7 @@ namespace abbe::daemon {
 struct JointOutcome {
   const JointInput& input;
   std::vector<calib::joint::PairTest> pairs;
+  std::vector<calib::joint::DirectedTest> directed;
   calib::joint::JointModel joint;
   std::vector<calib::joint::Contribution> contributions;  ///< one per part
   calib::Verdict verdict;
@@ -26,6 +27,8 @@ struct JointOutcome {
 /// The tests of all pairs, also of parts that contradict each other.
 [[nodiscard]] nlohmann::json pairs_json(const JointInput&,
                                         const std::vector<calib::joint::PairTest>&);
+[[nodiscard]] nlohmann::json directed_json(const JointInput&,
+                                           const std::vector<calib::joint::DirectedTest>&);
 [[nodiscard]] nlohmann::json joint_json(const JointOutcome&, const std::filesystem::path& folder);
 void print_joint_summary(const JointOutcome&, const std::filesystem::path& folder);
 /// For the report: the parts, whether they agree, and the uncertainty of each table.

@@ -44,6 +44,8 @@ struct CommonTables {
 struct Mistake {
   std::string text;  ///< "the errors have X and Y swapped"
   estimation::Information information;
+  /// Without the mistake, in the same form and with the same noise: the fit of both is comparable.
+  estimation::Information as_given;
 };
 
 struct Part {

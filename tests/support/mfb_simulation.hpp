@@ -109,9 +109,9 @@ struct ProbingOptions {
   double calibration = 1.0;  ///< factor of the errors of the calibration of the bar
   double drift_m = 0.0;      ///< of each pass, in a random direction
   double form_m = 0.0;       ///< form errors of the features, the same in all passes
-  double origin_m = 0.5e-3, axes_rad = 0.5e-3;     ///< pose beside the plan
+  double origin_m = 0.5e-3, axes_rad = 0.5e-3;  ///< pose beside the plan
   std::optional<calib::Expansivity> expansion;  ///< as the bar states it
-  double warmer_K = 0.0;                           ///< the bar above 20 degC, as measured
+  double warmer_K = 0.0;                        ///< the bar above 20 degC, as measured
   double alpha_error_per_K = 0.0;
   std::optional<calib::mfb::Sag> sag;
   calib::mfb::TouchPattern pattern = paper_pattern();  ///< of the bar
@@ -188,12 +188,15 @@ struct Clamping {
   Vector3 moved_m, turned_rad;
 };
 
+/// The readings of a machine when the centre of the tip is at a place.
+using ReadingOf = std::function<Vector3(const Vector3& p_m, const Vector3& tool_m)>;
+
 /// Probes a bar with a machine.
 class Probing {
  public:
-  Probing(const SimulatedMachine& machine, const calib::mfb::Plan& plan, std::mt19937_64& random,
+  Probing(ReadingOf reading_m, const calib::mfb::Plan& plan, std::mt19937_64& random,
           const ProbingOptions& options)
-      : machine_(machine),
+      : reading_m_(std::move(reading_m)),
         plan_(plan),
         options_(options),
         random_(random),
@@ -234,8 +237,7 @@ class Probing {
                                                                        nominal_[k].outward;
       touches.push_back(
           {nominal_[k].target,
-           machine_.reading_m(p_m, m.tool_offset_m) + options_.noise * noise_m + time * drift_m,
-           false});
+           reading_m_(p_m, m.tool_offset_m) + options_.noise * noise_m + time * drift_m, false});
     }
     return touches;
   }
@@ -254,7 +256,7 @@ class Probing {
     return SimulatedMachine::turned(clamping.turned_rad, p_m);
   }
 
-  const SimulatedMachine& machine_;
+  ReadingOf reading_m_;
   const calib::mfb::Plan& plan_;
   ProbingOptions options_;
   std::mt19937_64& random_;
@@ -264,9 +266,9 @@ class Probing {
   std::vector<Vector3> tips_m_;
 };
 
-inline ProbedBar probe(const SimulatedMachine& machine, const calib::mfb::Plan& plan,
-                       std::mt19937_64& random, const ProbingOptions& options = {}) {
-  Probing probing(machine, plan, random, options);
+inline ProbedBar probe(ReadingOf reading_m, const calib::mfb::Plan& plan, std::mt19937_64& random,
+                       const ProbingOptions& options = {}) {
+  Probing probing(std::move(reading_m), plan, random, options);
   ProbedBar probed{probing.calibrated(), {}};
   std::map<std::string, Clamping> clampings;
   const auto forward_of = calib::mfb::pairs_of(plan.measurements);
@@ -283,6 +285,13 @@ inline ProbedBar probe(const SimulatedMachine& machine, const calib::mfb::Plan& 
         probing.pass(m, clampings[m.position], drift_m.back(), forward_of[i] ? 1.0 : 0.0));
   }
   return probed;
+}
+
+inline ProbedBar probe(const SimulatedMachine& machine, const calib::mfb::Plan& plan,
+                       std::mt19937_64& random, const ProbingOptions& options = {}) {
+  return probe([&machine](const Vector3& p_m,
+                          const Vector3& tool_m) { return machine.reading_m(p_m, tool_m); },
+               plan, random, options);
 }
 
 /// Every measurement forward, then backward.

@@ -26,6 +26,7 @@
 #include "abbe/calib/estimation/information.hpp"
 #include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/mfb/observe.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
@@ -50,7 +51,7 @@ struct Mistake {
 
 struct Part {
   std::string name;    ///< for messages: "run 1"
-  std::string method;  ///< "otf", "evemu"
+  std::string method;  ///< "otf", "evemu", "mfb"
   /// about the parameters of the common tables, then `effects`; without the priors of the effects
   estimation::Information information;
   std::vector<std::string> effects{};
@@ -115,5 +116,25 @@ struct ArrayOptions {
 /// extrapolated), or if s is larger than `most_s_m`, naming the mistakes without which it is not.
 [[nodiscard]] Result<Part> part_of_array(std::string name, const evemu::Observations&,
                                          const CommonTables&, const ArrayOptions& = {});
+
+struct BarOptions {
+  /// Parts with the same name had the same bar, with the same errors of its calibration.
+  std::string bar = "bar";
+  CommonEffects effects{};  ///< of the scales; a bar has no ranges
+  /// Standard uncertainty of the roll of the bar (mfb::SolveOptions).
+  double u_roll_rad = 100e-6;
+};
+/// The machine with which mfb::observe() makes observations for part_of_bar(): all 18 tables on the
+/// nodes of the common ones.
+[[nodiscard]] mfb::MfbMachine bar_machine(const CommonTables&);
+/// The part of a Multi-Feature Bar: the rows of all positions (mfb/observe.hpp), their nuisances
+/// eliminated, with the weights that the plan states. A bar touched with several tools sees all 18
+/// tables. With the tool t of the common tables and the rotations phi that they leave out
+///     V(q, t + d) = V(q, t + d; common tables) + phi(q) x d
+/// holds exactly, so that phi is a nuisance of the part, one table each, without prior. Effects:
+/// errors of the calibration of the bar, error of its expansion. NotApplicable for observations on
+/// other axes or nodes; errors of the adjustment of the bar.
+[[nodiscard]] Result<Part> part_of_bar(std::string name, const mfb::Observations&,
+                                       const CommonTables&, const BarOptions& = {});
 
 }  // namespace abbe::calib::joint

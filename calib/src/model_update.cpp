@@ -9,6 +9,7 @@
 #include "abbe/calib/model_drift.hpp"
 #include "axis_scale_columns.hpp"
 #include "gauge_coordinates.hpp"
+#include "mean_misfit.hpp"
 #include "message.hpp"
 
 namespace abbe::calib {
@@ -108,23 +109,6 @@ Result<void> add_model(estimation::Information& sum, const Eigen::MatrixXd& C,
   return {};
 }
 
-/// The larger value of each, because neither run shows that the misfit of the other is not there.
-Misfit larger(const Misfit* a, const Misfit* b) {
-  if (a == nullptr || b == nullptr) {
-    return a != nullptr ? *a : (b != nullptr ? *b : Misfit{});
-  }
-  Misfit all = *a;
-  if (all.u_of_parameters.size() == 0) {
-    all.u_of_parameters = b->u_of_parameters;
-  } else if (b->u_of_parameters.size() > 0) {
-    all.u_of_parameters = all.u_of_parameters.cwiseMax(b->u_of_parameters);
-  }
-  all.u_V_m = all.u_V_m.cwiseMax(b->u_V_m);
-  all.table_length_m = std::max(a->table_length_m, b->table_length_m);
-  all.V_length_m = std::max(a->V_length_m, b->V_length_m);
-  return all;
-}
-
 std::vector<Eigen::Index> free_coordinates_of(const GaugeCoordinates& c,
                                               const std::vector<std::string>& without) {
   std::vector<Eigen::Index> kept;
@@ -192,7 +176,7 @@ Result<VolumetricModel> update_model(const VolumetricModel& previous, const Volu
              *run.tables(), run.gauge(), run.tool_offsets_m(), U, covariance,
              options.renewed.empty() ? previous.validity() : run.validity())
       .and_then([&](const VolumetricModel& updated) {
-        return updated.with_misfit(larger(previous.misfit(), run.misfit()));
+        return updated.with_misfit(larger_misfit(previous.misfit(), run.misfit()));
       });
 }
 

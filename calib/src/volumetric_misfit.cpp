@@ -81,4 +81,20 @@ double mean_misfit_m2(const VolumetricModel& model, std::span<const Vector3> pla
   return sum_m2 / std::max(1.0, static_cast<double>(places_m.size()));
 }
 
+Misfit larger_misfit(const Misfit* a, const Misfit* b) {
+  if (a == nullptr || b == nullptr) {
+    return a != nullptr ? *a : (b != nullptr ? *b : Misfit{});
+  }
+  Misfit all = *a;
+  if (all.u_of_parameters.size() == 0) {
+    all.u_of_parameters = b->u_of_parameters;
+  } else if (b->u_of_parameters.size() > 0) {
+    all.u_of_parameters = all.u_of_parameters.cwiseMax(b->u_of_parameters);
+  }
+  all.u_V_m = all.u_V_m.cwiseMax(b->u_V_m);
+  all.table_length_m = std::max(a->table_length_m, b->table_length_m);
+  all.V_length_m = std::max(a->V_length_m, b->V_length_m);
+  return all;
+}
+
 }  // namespace abbe::calib

@@ -6,8 +6,11 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <vector>
 
+#include "abbe/calib/joint/identify.hpp"
 #include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model_update.hpp"
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/calib/otf/judge.hpp"
 #include "otf_run.hpp"
@@ -135,6 +138,24 @@ TEST(OtfMisfit, IsKeptByDescriptionAndReadBack) {
   const Vector3 q_m(0.02, 0.1, -0.3);
   EXPECT_EQ(read->error_at(q_m, model.tool_offsets_m().front()).cov_V_m2,
             model.error_at(q_m, model.tool_offsets_m().front()).cov_V_m2);
+}
+
+/// Neither a later run that does not show it nor another part removes a misfit.
+TEST(OtfMisfit, IsKeptByUpdatesAndJointModels) {
+  const VolumetricModel with = identification_of(run_with(waves_of_X)).solution.model;
+  const VolumetricModel without = identification_of(run_with(nothing)).solution.model;
+  const auto updated = update_model(with, without, {});
+  ASSERT_TRUE(updated) << updated.error().text;
+  ASSERT_NE(updated->misfit(), nullptr);
+  EXPECT_EQ(updated->misfit()->u_of_parameters, with.misfit()->u_of_parameters);
+
+  const joint::CommonTables common = *joint::tables_of(with);
+  const std::vector parts{*joint::part_of_run("run 1", with, common),
+                          *joint::part_of_run("run 2", without, common)};
+  const auto both = joint::joint_model(parts, common);
+  ASSERT_TRUE(both) << both.error().text;
+  ASSERT_NE(both->model.misfit(), nullptr);
+  EXPECT_EQ(both->model.misfit()->u_of_parameters, with.misfit()->u_of_parameters);
 }
 
 TEST(Misfit, WrongSizesAndValuesAreRefused) {

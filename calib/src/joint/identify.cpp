@@ -13,6 +13,7 @@
 #include "joint/directed.hpp"
 #include "joint/explanations.hpp"
 #include "joint/pair_problem.hpp"
+#include "mean_misfit.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::joint {
@@ -154,6 +155,16 @@ std::vector<std::string> contradictions_of(const std::vector<PairTest>& pairs,
   return texts;
 }
 
+Misfit largest_misfit(std::span<const Part> parts) {
+  Misfit largest;
+  for (const Part& part : parts) {
+    if (part.misfit) {
+      largest = larger_misfit(&largest, &*part.misfit);
+    }
+  }
+  return largest;
+}
+
 /// Without the interior points of large parts.
 Result<ValidityVolume> validity_of(std::span<const Part> parts) {
   std::vector<Vector3> covered;
@@ -225,7 +236,10 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
   const Eigen::MatrixXd C = c.N * of_e * c.N.transpose();
   Result<VolumetricModel> model =
       VolumetricModel::from_vector(common.basis, Gauge::G2, std::array{common.tool_offset_m}, U,
-                                   0.5 * (C + C.transpose()), *std::move(validity));
+                                   0.5 * (C + C.transpose()), *std::move(validity))
+          .and_then([&](const VolumetricModel& of_tables) {
+            return of_tables.with_misfit(largest_misfit(parts));
+          });
   if (!model) {
     return tl::unexpected(model.error());
   }

@@ -59,13 +59,13 @@ Eigen::MatrixXd all_tables_of(const CommonTables& common, const ParameterLayout&
   return M;
 }
 
-/// The same in gauge G1 of all tables, which the adjustment of the bar has.
+/// The same in gauge G2 of all tables, which the adjustment of the bar has.
 Result<Eigen::MatrixXd> all_tables_in_gauge(const CommonTables& common,
                                             const estimation::TableBasis& all) {
   // Three tools that are not on a line: the tables describe every tool.
   const std::array tools_m{Vector3(0.0, 0.0, 0.0), Vector3(0.1, 0.0, 0.0), Vector3(0.0, 0.1, 0.0)};
   const ParameterLayout& layout = all.layout();
-  const estimation::Datum gauge(gauge_conditions(Gauge::G1, all, layout.fit_size()));
+  const estimation::Datum gauge(gauge_conditions(Gauge::G2, all, layout.fit_size()));
   return gauge.transformation(unobservable_combinations(layout, tools_m))
       .map([&](const Eigen::MatrixXd& S) {
         const auto model = static_cast<Eigen::Index>(layout.model_size());

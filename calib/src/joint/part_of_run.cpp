@@ -235,7 +235,8 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
                                                 : information.without_unknowns(eliminated),
               .effects = std::move(shared.names),
               .u_of_effects = std::move(shared.u),
-              .covered_m = {hull.begin(), hull.end()}};
+              .covered_m = {hull.begin(), hull.end()},
+              .misfit = model.misfit() != nullptr ? std::optional(*model.misfit()) : std::nullopt};
 }
 
 }  // namespace abbe::calib::joint

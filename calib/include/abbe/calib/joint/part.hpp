@@ -62,6 +62,7 @@ struct Part {
   /// these degrees of freedom; 0: the uncertainties were stated.
   double dof_of_noise = 0.0;
   std::vector<Vector3> covered_m{};  ///< axis positions; their hull is the validity volume
+  std::optional<Misfit> misfit{};    ///< of the model of a run; the joint model has the largest
   /// Mistakes of the method; called only if the part contradicts another one. May be empty.
   std::function<std::vector<Mistake>()> mistakes{};
 };

@@ -15,9 +15,6 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// An explanation must leave a chi-square that occurs with a larger probability.
-constexpr double kLikely = 1e-3;
-
 /// Probability of a larger |d| if both are the same.
 double p_of(const AllParts::Directed& found) {
   const double t = found.d / found.u;
@@ -80,6 +77,7 @@ std::vector<Direction> directions(const GaugeCoordinates& c, const ParameterLayo
 std::vector<DirectedFinding> directed_findings(std::span<const Part> parts,
                                                const GaugeCoordinates& c,
                                                const ParameterLayout& layout, double false_alarm) {
+  constexpr double kLikely = 1e-3;  // an explanation must leave a larger probability
   const AllParts all(parts, c);
   const std::size_t first = first_tested(parts.size());
   const auto comparisons = static_cast<double>(parts.size() - first);

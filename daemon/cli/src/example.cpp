@@ -32,7 +32,7 @@ constexpr std::array kPurposes{
     Purpose{"plan.toml", "measurements with a bar: positions, tools, noise, for abbe identify mfb"},
     Purpose{"barpoints.csv", "touches of a bar, for abbe identify mfb --points"},
     Purpose{"gauge.toml", "a step gauge on the line of a bar, for abbe identify bar"},
-    Purpose{"parts.toml", "runs and ball arrays for abbe identify joint"},
+    Purpose{"parts.toml", "runs, ball arrays and bars for abbe identify joint"},
     Purpose{"errors.csv", "errors at the balls of an array, from another program or instrument"},
     Purpose{"points.csv", "positions for abbe model eval"},
     Purpose{"verification.csv", "readings and independent measurements for abbe verify"},

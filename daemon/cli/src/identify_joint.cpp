@@ -1,4 +1,4 @@
-// `abbe identify joint`: one model from several runs and ball arrays that agree.
+// `abbe identify joint`: one model from several runs, ball arrays and bars that agree.
 #include <fmt/format.h>
 
 #include <CLI/App.hpp>
@@ -145,7 +145,7 @@ void add_joint_options(CLI::App& command, IdentifyJointArguments& arguments) {
       ->required();
   command
       .add_option("--parts", arguments.parts,
-                  "parts.toml: [[run]] and [[array]] tables with the files of each part;\n"
+                  "parts.toml: [[run]], [[array]] and [[bar]] tables with the files of each part;\n"
                   "`abbe example parts.toml` prints a commented one")
       ->required();
   command
@@ -175,14 +175,13 @@ void add_identify_joint(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyJointArguments>();
   auto* command = parent.add_subcommand(
       "joint",
-      "Identify one model from several runs with a laser tracker (also from several places) and\n"
-      "ball arrays touched on the same machine. Every pair of parts is tested in what both\n"
-      "determine, every part in its lengths and squareness. Parts that contradict each other give "
-      "no\n"
-      "model (exit code 1); the message names what explains it: length, squareness, sign, unit,\n"
-      "axes, tool, tables. Else model.json, tables.csv and report.html are written to OUT. The "
-      "model\n"
-      "is nowhere less certain than that of a part.\n"
+      "Identify one model from several runs with a laser tracker (also from several places), ball\n"
+      "arrays and Multi-Feature Bars touched on the same machine. Every pair of parts is tested "
+      "in\n"
+      "what both determine, every part in its lengths and squareness. Parts that contradict each\n"
+      "other give no model (exit code 1); the message names what explains it: length, squareness,\n"
+      "sign, unit, axes, tool, tables. Else model.json, tables.csv and report.html are written to\n"
+      "OUT. The model is nowhere less certain than that of a part.\n"
       "Exit code 5 if the gate would refuse the model; the files are written in any case.");
   add_joint_options(*command, *arguments);
   command->callback([arguments, &exit] { exit = run_joint(*arguments); });

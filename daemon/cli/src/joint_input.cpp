@@ -14,6 +14,7 @@
 #include "abbe/tables/parts_file.hpp"
 #include "evemu_input.hpp"
 #include "identify_otf.hpp"
+#include "joint_bar.hpp"
 #include "opened_recording.hpp"
 
 namespace abbe::daemon {
@@ -240,6 +241,11 @@ Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, Pro
   for (const ArrayFiles& array : files->arrays)
     if (const auto added = add_array(arguments, array, input, bar); !added)
       return tl::make_unexpected(added.error());
+  for (const BarFiles& files_of_bar : files->bars) {
+    bar.show(fmt::format("evaluating {}", files_of_bar.name), 0.0);
+    if (const auto added = add_bar(arguments, files_of_bar, input); !added)
+      return tl::make_unexpected(in_part(files_of_bar.name, added.error()));
+  }
 
   return input;
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// The measured data of `abbe identify joint`: every run and array of parts.toml, identified and
-/// judged by its own method, as part of a joint identification.
+/// The measured data of `abbe identify joint`: every run, array and bar of parts.toml, identified
+/// and judged by its own method, as part of a joint identification.
 
 #include <deque>
 #include <optional>
@@ -28,7 +28,7 @@ struct IdentifyJointArguments {
 struct PartFacts {
   std::string name, method, files;
   std::size_t observations = 0;
-  std::optional<calib::VolumetricModel> own_model{};  ///< tables; nullopt for an array
+  std::optional<calib::VolumetricModel> own_model{};  ///< tables; nullopt for an array or a bar
   calib::Verdict verdict;                             ///< on the part alone
 };
 
@@ -36,7 +36,7 @@ struct JointInput {
   Config config;
   std::vector<InputFile> sources;
   std::optional<calib::joint::CommonTables> common{};   ///< of the first run
-  std::vector<calib::joint::Part> parts{};              ///< runs, then arrays
+  std::vector<calib::joint::Part> parts{};              ///< runs, arrays, bars
   std::vector<PartFacts> facts{};                       ///< one per part
   std::deque<calib::otf::Observations> observations{};  ///< of the runs; `runs` points to them
   std::vector<calib::joint::RunOfPart> runs{};

@@ -73,6 +73,16 @@ ArrayFiles read_array(Section& part, std::size_t number, const std::filesystem::
   return array;
 }
 
+BarFiles read_bar(Section& part, std::size_t number, const std::filesystem::path& folder) {
+  BarFiles bar{.name = fmt::format("bar {}", number)};
+  part.get("name", bar.name);
+  read_file_name(part, "bar", bar.bar, folder, Need::Required);
+  read_file_name(part, "plan", bar.plan, folder, Need::Required);
+  read_file_name(part, "points", bar.points, folder, Need::Required);
+  part.close();
+  return bar;
+}
+
 void check_names(const PartsFile& parts, Section& root) {
   std::set<std::string> names;
   const auto take = [&](const std::string& key, const std::string& name) {
@@ -81,6 +91,7 @@ void check_names(const PartsFile& parts, Section& root) {
   };
   for (const RunFiles& run : parts.runs) take("run", run.name);
   for (const ArrayFiles& array : parts.arrays) take("array", array.name);
+  for (const BarFiles& bar : parts.bars) take("bar", bar.name);
 }
 
 /// Two instruments have no range offset in common.
@@ -108,17 +119,19 @@ Result<PartsFile> read_parts_toml(const std::filesystem::path& file) {
   if (!table) return tl::make_unexpected(table.error());
   Faults faults(file.string());
   Section root(&*table, "", {1, 1}, faults);
-  PartsFile out{{file.filename().string(), sha256_hex(*text)}, {}, {}};
+  PartsFile out{{file.filename().string(), sha256_hex(*text)}, {}, {}, {}};
 
   for (Section& part : root.children("run"))
     out.runs.push_back(read_run(part, out.runs.size() + 1, file.parent_path()));
   for (Section& part : root.children("array"))
     out.arrays.push_back(read_array(part, out.arrays.size() + 1, file.parent_path()));
+  for (Section& part : root.children("bar"))
+    out.bars.push_back(read_bar(part, out.bars.size() + 1, file.parent_path()));
   root.close();
   if (out.runs.empty())
     root.fault("run", "needs at least one: the model has the tables of the first [[run]]");
-  else if (out.runs.size() + out.arrays.size() < 2)
-    root.fault("array", "needs two parts or more, each a [[run]] or an [[array]]");
+  else if (out.runs.size() + out.arrays.size() + out.bars.size() < 2)
+    root.fault("array", "needs two parts or more, each a [[run]], an [[array]] or a [[bar]]");
   check_names(out, root);
   check_range_offsets(out, root);
 

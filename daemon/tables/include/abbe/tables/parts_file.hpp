@@ -43,10 +43,17 @@ struct ArrayFiles {
   double s_centre_m = 0.0;
 };
 
+/// [[bar]]: touches of a Multi-Feature Bar.
+struct BarFiles {
+  std::string name;               ///< default: "bar 1", ...
+  std::string bar, plan, points;  ///< as for `abbe identify mfb`
+};
+
 struct PartsFile {
   InputFile source;
   std::vector<RunFiles> runs;
   std::vector<ArrayFiles> arrays;
+  std::vector<BarFiles> bars;
 };
 
 /// BadInput without a run, with fewer than two parts, if two parts have one name, or if runs with the

@@ -280,7 +280,11 @@ TEST_F(JointCli, AWrongUnitIsNamed) {
 /// A length that is wrong by 100 um/m, as of an array that is 9 K warmer than stated.
 TEST_F(JointCli, AWrongLengthOfTheArrayIsNamedWithItsValue) {
   auto longer = *array_;
-  for (auto& row : longer.rows) row.V_m += 100e-6 * row.reading_m;
+  Vector3 ball1_m = Vector3::Zero();  // of the position, whose first ball it is
+  for (auto& row : longer.rows) {
+    if (row.ball == 1) ball1_m = row.reading_m;
+    row.V_m += 100e-6 * (row.reading_m - ball1_m);
+  }
   write("longer.csv", joint_errors_csv(longer, 1.0));
   const auto ran = identify(kFrontRun + errors_of("longer.csv"), "none", "--json");
   expect_refused(ran, 1, "array: its lengths are larger by ");

@@ -83,6 +83,10 @@ TEST(Gate, ARigidMotionOfVDoesNotCountAsItsSize) {
   for (Eigen::Index i = 0; i < 4; ++i) {
     U(static_cast<Eigen::Index>(roll.offset) + i) = 100e-6 * static_cast<double>(i);
   }
+  // Seven metres from machine zero the roll moves the volume like rotations about Y and Z, if the
+  // squareness errors complete them.
+  const double rotation_rad = 100e-6 / 0.2 * 7.0;
+  U.tail<3>() = Vector3(0.0, rotation_rad, rotation_rad);
   const VolumetricModel model =
       *VolumetricModel::from_vector(layout, Gauge::G2, std::array{machine.target_offset_m}, U,
                                     Eigen::MatrixXd::Zero(U.size(), U.size()),
@@ -251,7 +255,8 @@ TEST(Gate, SeesTheSlopeOfPolynomialsInAThinVolume) {
   // P3' = 6 at the end of the span of 0.3 m.
   const Verdict verdict = decide(thin_slab(0.5e-3), figures(100, 1));
   EXPECT_NEAR(verdict.max_gradient, 6 * 0.5e-3 / 0.3, 1e-4);
-  EXPECT_NEAR(verdict.max_error_m, 0.5e-3, 1e-6);
+  // 0.5 mm, of which a rotation, with which the tilted slab agrees, removes the linear part.
+  EXPECT_NEAR(verdict.max_error_m, 0.4e-3, 0.02e-3);
   EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr("steepest change")));
 }
 

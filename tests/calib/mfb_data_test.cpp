@@ -213,7 +213,7 @@ double u_of_travel_m(double u_K, std::optional<double> u_common_K) {
 
 /// A thermometer that is wrong is wrong at every position: more positions do not help.
 TEST(MfbIdentify, TheErrorOfTheThermometerIsCommonToAllPositions) {
-  const std::vector<double>& nodes_m = paper_machine().nodes[0].nodes_m;
+  const std::vector<double> nodes_m = paper_machine().nodes[0].nodes_m;
   const double common_m = 11e-6 * 0.3 * (nodes_m.back() - nodes_m.front());
   EXPECT_GT(u_of_travel_m(0.3, std::nullopt), common_m);
   EXPECT_NEAR(u_of_travel_m(0.0, 0.3), common_m, 0.3 * common_m);

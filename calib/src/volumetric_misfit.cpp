@@ -1,5 +1,6 @@
 // The part of VolumetricModel that contains the misfit.
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "abbe/calib/basis.hpp"
@@ -79,6 +80,28 @@ double mean_misfit_m2(const VolumetricModel& model, std::span<const Vector3> pla
     sum_m2 += model.misfit_cov_V_m2(q, model.tool_offsets_m().front()).trace();
   }
   return sum_m2 / std::max(1.0, static_cast<double>(places_m.size()));
+}
+
+bool is_notable_misfit(const VolumetricModel& model) {
+  constexpr int kPerAxis = 5;
+  constexpr double kLeast = 1.02 * 1.02 - 1.0;  // of the variance
+  std::vector<Vector3> places_m;
+  for (int i = 0; i < kPerAxis * kPerAxis * kPerAxis; ++i) {
+    const std::array at{i % kPerAxis, i / kPerAxis % kPerAxis, i / kPerAxis / kPerAxis};
+    Vector3& q_m = places_m.emplace_back();
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::vector<double>& nodes_m = model.nodes()[a].nodes_m;
+      q_m(static_cast<Eigen::Index>(a)) =
+          nodes_m.front() + (nodes_m.back() - nodes_m.front()) * at[a] / (kPerAxis - 1.0);
+    }
+  }
+  double all_m2 = 0.0;
+  for (const Vector3& q_m : places_m) {
+    all_m2 += model.error_at(q_m, model.tool_offsets_m().front()).cov_V_m2.trace() /
+              static_cast<double>(places_m.size());
+  }
+  const double of_misfit_m2 = mean_misfit_m2(model, places_m);
+  return of_misfit_m2 >= kLeast * (all_m2 - of_misfit_m2);
 }
 
 Misfit larger_misfit(const Misfit* a, const Misfit* b) {

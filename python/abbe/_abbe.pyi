@@ -47,7 +47,7 @@ class Model:
         inside: the reading is in the validity volume, and the model holds for the tool. direction:
         of the travel of X, Y, Z, -1, 0 (unknown) or 1 each; abbe.Error if the model has no backlash.
         Where it is unknown, V is the mean of both directions, and the covariance contains half the
-        difference.
+        difference. It also contains the misfit of the model, which `covariance` does not.
         """
     @property
     def verdict(self) -> dict[str, Any] | None:

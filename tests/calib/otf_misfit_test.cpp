@@ -25,22 +25,22 @@ using ::testing::HasSubstr;
 using MoreError = std::function<Vector3(const Vector3& q_m)>;
 
 Vector3 waves_of_X(const Vector3& q_m) {
-  constexpr double kSize_m = 5e-6, kLength_m = 0.1;
-  return kSize_m * std::sin(2.0 * M_PI * q_m.x() / kLength_m) * Vector3(0.0, 1.0, 0.0);
+  constexpr double kWave_m = 5e-6, kPeriod_m = 0.1;
+  return kWave_m * std::sin(2.0 * M_PI * q_m.x() / kPeriod_m) * Vector3(0.0, 1.0, 0.0);
 }
 Vector3 step_of_Y(const Vector3& q_m) {
-  constexpr double kStep_m = 20e-6, kAt_m = -0.13;
-  return (q_m.y() > kAt_m ? kStep_m : 0.0) * Vector3(1.0, 0.0, 0.0);
+  constexpr double kStepOfY_m = 20e-6, kPlaceOfStep_m = -0.13;
+  return (q_m.y() > kPlaceOfStep_m ? kStepOfY_m : 0.0) * Vector3(1.0, 0.0, 0.0);
 }
-/// A tilt about Z that depends on X and Y, of a long tool along Y.
+/// Along Y, where no table contains a product of X and Y.
 Vector3 tilt_of_X_and_Y(const Vector3& q_m) {
-  return 150e-6 * q_m.x() * q_m.y() * Vector3(1.0, 0.0, 0.0);
+  return 300e-6 * q_m.x() * q_m.y() * Vector3(0.0, 1.0, 0.0);
 }
-Vector3 nothing(const Vector3&) {
+Vector3 no_error(const Vector3&) {
   return Vector3::Zero();
 }
 
-MadeRun run_with(const MoreError& error, unsigned seed = 1) {
+MadeRun run_with_error(const MoreError& error, unsigned seed = 1) {
   MadeRun run = make_run({.seed = seed, .noise_seed = seed});
   const RigidTransform& T = run.T_machine_tracker;
   for (TrackerObservation& sample : run.samples) {
@@ -51,7 +51,7 @@ MadeRun run_with(const MoreError& error, unsigned seed = 1) {
   return run;
 }
 
-Identification identification_of(const MadeRun& run) {
+Identification identified_with(const MadeRun& run) {
   return *identify(run.samples, run.machine, run.path, run.noise, run.options);
 }
 
@@ -92,14 +92,14 @@ double u_at_nodes_m(const VolumetricModel& model, ErrorMotion motion, std::size_
 
 TEST(OtfMisfit, NoneInSoundRuns) {
   for (const unsigned seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
-    const Identification id = identification_of(run_with(nothing, seed));
+    const Identification id = identified_with(run_with_error(no_error, seed));
     EXPECT_EQ(id.solution.model.misfit(), nullptr) << seed;
   }
 }
 
 TEST(OtfMisfit, WavesShorterThanTheNodeDistanceAreInU) {
-  const MadeRun run = run_with(waves_of_X);
-  const Identification id = identification_of(run);
+  const MadeRun run = run_with_error(waves_of_X);
+  const Identification id = identified_with(run);
   const VolumetricModel& model = id.solution.model;
   ASSERT_NE(model.misfit(), nullptr);
   const double u_m = u_at_nodes_m(model, {Motion::Y, Axis::X}, 1);
@@ -112,25 +112,26 @@ TEST(OtfMisfit, WavesShorterThanTheNodeDistanceAreInU) {
 }
 
 TEST(OtfMisfit, AStepIsFoundInItsCell) {
-  const MadeRun run = run_with(step_of_Y);
-  const Identification id = identification_of(run);
+  const MadeRun run = run_with_error(step_of_Y);
+  const Identification id = identified_with(run);
   const VolumetricModel& model = id.solution.model;
   ASSERT_NE(model.misfit(), nullptr);
   const ErrorMotion EXY{Motion::X, Axis::Y};
   EXPECT_GT(u_at_nodes_m(model, EXY, 0), 3.0 * u_at_nodes_m(model, EXY, 2));
-  EXPECT_GE(share_below_U(run, model, step_of_Y), 0.93);
+  // A sawtooth in one of two cells, which also turns the other.
+  EXPECT_GE(share_below_U(run, model, step_of_Y), 0.9);
 }
 
 TEST(OtfMisfit, ErrorsOfTwoAxesAreInU) {
-  const MadeRun run = run_with(tilt_of_X_and_Y);
-  const Identification id = identification_of(run);
+  const MadeRun run = run_with_error(tilt_of_X_and_Y);
+  const Identification id = identified_with(run);
   const VolumetricModel& model = id.solution.model;
   ASSERT_NE(model.misfit(), nullptr);
   EXPECT_GE(share_below_U(run, model, tilt_of_X_and_Y), 0.93);
 }
 
 TEST(OtfMisfit, IsKeptByDescriptionAndReadBack) {
-  const Identification id = identification_of(run_with(waves_of_X));
+  const Identification id = identified_with(run_with_error(waves_of_X));
   const VolumetricModel& model = id.solution.model;
   const auto read = VolumetricModel::from_description(model.description());
   ASSERT_TRUE(read) << read.error().text;
@@ -142,8 +143,8 @@ TEST(OtfMisfit, IsKeptByDescriptionAndReadBack) {
 
 /// Neither a later run that does not show it nor another part removes a misfit.
 TEST(OtfMisfit, IsKeptByUpdatesAndJointModels) {
-  const VolumetricModel with = identification_of(run_with(waves_of_X)).solution.model;
-  const VolumetricModel without = identification_of(run_with(nothing)).solution.model;
+  const VolumetricModel with = identified_with(run_with_error(waves_of_X)).solution.model;
+  const VolumetricModel without = identified_with(run_with_error(no_error)).solution.model;
   const auto updated = update_model(with, without, {});
   ASSERT_TRUE(updated) << updated.error().text;
   ASSERT_NE(updated->misfit(), nullptr);
@@ -159,7 +160,7 @@ TEST(OtfMisfit, IsKeptByUpdatesAndJointModels) {
 }
 
 TEST(Misfit, WrongSizesAndValuesAreRefused) {
-  const VolumetricModel model = identification_of(run_with(nothing)).solution.model;
+  const VolumetricModel model = identified_with(run_with_error(no_error)).solution.model;
   EXPECT_THAT(model.with_misfit({.u_of_parameters = Eigen::VectorXd::Ones(3)}).error().text,
               HasSubstr("misfit of 3 parameters"));
   EXPECT_THAT(model.with_misfit({.u_V_m = Vector3(-1e-6, 0, 0)}).error().text,

@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 namespace abbe::calib::otf {
 namespace {
@@ -36,6 +38,44 @@ class Products {
  private:
   std::vector<Eigen::MatrixXd> sums_;
 };
+
+/// Slow noise is independent after this many correlation times: its correlation is below 2 %.
+constexpr double kCorrelationTimes = 4.0;
+
+double time_of(const Observations& o, const Observation& row) {
+  return row.block < o.block_s.size() ? o.block_s[row.block] : static_cast<double>(row.block);
+}
+
+/// Consecutive legs within half of the time after which slow noise is independent count as one: else
+/// the products of one leg with each of them would be alike, and chance would seem impossible. So do
+/// some legs of a long path, because the products of all pairs need memory. By leg: its group.
+std::vector<std::size_t> groups_of_legs(const Observations& o, double correlation_time) {
+  constexpr std::size_t kMostGroups = 200;
+  const std::size_t legs = o.rows.empty() ? 0 : o.rows.back().leg + 1;
+  std::vector<double> begin(legs, std::numeric_limits<double>::infinity());
+  for (const Observation& row : o.rows) {
+    begin[row.leg] = std::min(begin[row.leg], time_of(o, row));
+  }
+
+  const double least_time = 0.5 * kCorrelationTimes * correlation_time;
+  const std::size_t least_legs = 1 + legs / kMostGroups;
+  std::vector<std::size_t> group_of(legs, 0);
+  std::size_t group = 0;
+  std::optional<std::size_t> first;
+  for (std::size_t leg = 0; leg < legs; ++leg) {
+    if (!std::isfinite(begin[leg])) {
+      continue;  // without rows
+    }
+    if (!first) {
+      first = leg;
+    } else if (leg - *first >= least_legs && begin[leg] - begin[*first] >= least_time) {
+      ++group;
+      first = leg;
+    }
+    group_of[leg] = group;
+  }
+  return group_of;
+}
 
 /// x >= 0 with K x = q, as nearly as possible: unknowns that become negative are set to zero.
 Eigen::VectorXd not_negative(const Eigen::MatrixXd& K, const Eigen::VectorXd& q) {
@@ -78,30 +118,21 @@ RepeatedResiduals::RepeatedResiduals(const Places& places, std::span<const Resid
 
 void RepeatedResiduals::add_run(const Places& places, const ResidualsOfRun& run, std::size_t number,
                                 std::size_t unknowns) {
-  constexpr double kCorrelationTimes = 4.0;  // after which the correlation is below 2 %
-  constexpr double kMostOfRun = 0.125;
   const Observations& o = run.o;
   const std::size_t first = legs_.size();
   const auto n = static_cast<Eigen::Index>(components_);
-  const auto time_of = [&](const Observation& row) {
-    return row.block < o.block_s.size() ? o.block_s[row.block] : static_cast<double>(row.block);
-  };
-  // Consecutive legs of a long path count as one: the products of all pairs need memory.
-  constexpr std::size_t kMostLegs = 200;
-  const std::size_t per_group = 1 + (o.rows.empty() ? 0 : o.rows.back().leg) / kMostLegs;
-  const double duration = o.rows.empty() ? 0.0 : time_of(o.rows.back()) - time_of(o.rows.front());
-  const double far = std::min(kCorrelationTimes * run.correlation_time, kMostOfRun * duration);
+  const std::vector<std::size_t> group_of_leg = groups_of_legs(o, run.correlation_time);
 
   Eigen::VectorXd x(n);
   std::vector<double> rows_of_leg;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Observation& row = o.rows[i];
-    const std::size_t leg = first + row.leg / per_group;
+    const std::size_t leg = first + group_of_leg[row.leg];
     while (legs_.size() <= leg) {
-      legs_.push_back({.run = number, .far = far});
+      legs_.push_back({.run = number, .far = kCorrelationTimes * run.correlation_time});
       rows_of_leg.push_back(0.0);
     }
-    legs_[leg].time += time_of(row);
+    legs_[leg].time += time_of(o, row);
     rows_of_leg[leg - first] += 1.0;
 
     const Section at = places.section_of(row);

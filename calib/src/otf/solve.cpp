@@ -9,6 +9,7 @@
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "check_stopped.hpp"
+#include "mean_misfit.hpp"
 #include "message.hpp"
 #include "otf/find_misfit.hpp"
 #include "otf/row_residuals.hpp"
@@ -189,9 +190,10 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
     figures = statistics(o, *a, residuals);
   }
 
+  // Of the noise that the residuals have, also where it is smaller than stated.
+  FitOfRows fit{a->U, residuals.after_m, figures.chi2_per_dof * figures.correlation * a->covariance,
+                figures.correlation * block_distance(o), two_axes};
   a->covariance *= figures.variance_factor;
-  FitOfRows fit{a->U, residuals.after_m, a->covariance, figures.correlation * block_distance(o),
-                two_axes};
   a->covariance += root_of_offset * root_of_offset.transpose();
   if (drift) {
     a->covariance += drift->added_covariance;
@@ -236,16 +238,21 @@ Result<Solution> with_misfit(Solution s, Observations& o) {
     return s;
   }
 
-  s.covariance_with_rigid += found->root_of_covariance * found->root_of_covariance.transpose();
-  Result<VolumetricModel> model = model_of(o, std::array{o.target_offset_m}, s.fit.U,
-                                           s.covariance_with_rigid, s.model.validity());
-  if (model) {
-    model = model->with_misfit(std::move(found->misfit));
-  }
+  const Eigen::MatrixXd covariance =
+      s.covariance_with_rigid + found->root_of_covariance * found->root_of_covariance.transpose();
+  Result<VolumetricModel> model =
+      model_of(o, std::array{o.target_offset_m}, s.fit.U, covariance, s.model.validity())
+          .and_then([&](const VolumetricModel& of_tables) {
+            return of_tables.with_misfit(std::move(found->misfit));
+          });
   if (!model) {
     return tl::unexpected(model.error());
   }
+  if (!is_notable_misfit(*model)) {
+    return s;
+  }
   s.model = *std::move(model);
+  s.covariance_with_rigid = covariance;
   s.backlash = backlash_of(o, s.fit.U, s.covariance_with_rigid);
   o.notes.insert(o.notes.end(), found->notes.begin(), found->notes.end());
   return s;

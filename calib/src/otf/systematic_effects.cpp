@@ -37,13 +37,13 @@ Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
 
 namespace {
 
-/// The range offset, if it has a prior, and the errors of two axes as added columns.
+/// The range offset, which is an unknown if it has a prior, and the errors of two axes as added
+/// columns.
 class RunEffects {
  public:
   RunEffects(const Observations& o, const WhitenedRows& rows, std::span<const double> residual_m)
-      : o_(o), has_offset_(o.u_range_offset_m > 0.0), sums_(columns(), o.unknowns()) {
-    const auto n = static_cast<Eigen::Index>(columns());
-    RowMatrix values = RowMatrix::Zero(std::ssize(o.rows), n);
+      : o_(o), sums_(kColumns, o.unknowns()) {
+    RowMatrix values = RowMatrix::Zero(std::ssize(o.rows), kColumns);
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
       set_values(values.row(static_cast<Eigen::Index>(i)), o.rows[i]);
     }
@@ -51,7 +51,7 @@ class RunEffects {
     const std::vector<double> r_m = rows.values(residual_m);
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
       sums_.add(o.rows[i], rows.row(i), r_m[i],
-                std::span(values.row(static_cast<Eigen::Index>(i)).data(), columns()));
+                std::span(values.row(static_cast<Eigen::Index>(i)).data(), kColumns));
     }
   }
 
@@ -59,47 +59,52 @@ class RunEffects {
   [[nodiscard]] AddedColumns::Estimate estimate(const Eigen::MatrixXd& Q, double s_m,
                                                 double factor) const {
     if (s_m > 0.0) {
-      Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(columns()), s_m);
-      if (has_offset_) {
-        u(0) = o_.u_range_offset_m;
-      }
+      constexpr double kNone_m = 1e-12;
+      Eigen::VectorXd u = Eigen::VectorXd::Constant(kColumns, s_m);
+      u(0) = has_offset() ? o_.u_range_offset_m : kNone_m;
       return sums_.estimate_with_priors(Q, u, factor);
     }
-    if (has_offset_) {
-      return sums_.first(1).estimate_with_prior(Q, o_.u_range_offset_m, factor);
+    if (has_offset()) {
+      return offset_alone(Q, o_.u_range_offset_m, factor);
     }
     const Eigen::Index n = Q.rows();
     return {.dU = Eigen::VectorXd::Zero(n), .root_cov_dU = Eigen::MatrixXd::Zero(n, 1)};
   }
-  [[nodiscard]] bool has_offset() const { return has_offset_; }
+  [[nodiscard]] AddedColumns::Estimate offset_alone(const Eigen::MatrixXd& Q, double u_m,
+                                                    double factor) const {
+    return sums_.first(1).estimate_with_prior(Q, u_m, factor);
+  }
+  [[nodiscard]] bool has_offset() const { return o_.u_range_offset_m > 0.0; }
   [[nodiscard]] AddedColumns::Reduced reduced(const Eigen::MatrixXd& Q) const {
     return sums_.reduced(Q);
   }
 
  private:
-  [[nodiscard]] std::size_t columns() const { return kTwoAxisErrors + (has_offset_ ? 1 : 0); }
+  static constexpr std::size_t kColumns = 1 + kTwoAxisErrors;
+
   void set_values(Eigen::Ref<Eigen::RowVectorXd> values, const Observation& row) const {
-    Eigen::Index at = 0;
-    if (has_offset_) {
-      values(at++) = drow_drange_offset(o_, row);
-    }
+    values(0) = drow_drange_offset(o_, row);
     const Vector3 products = TwoAxisErrors::products(o_.layout().nodes(), row.axis_position_m);
     for (Eigen::Index pair = 0; pair < 3; ++pair) {
-      values.segment<3>(at + 3 * pair) = products(pair) * row.direction.transpose();
+      values.segment<3>(1 + 3 * pair) = products(pair) * row.direction.transpose();
     }
   }
 
   const Observations& o_;
-  bool has_offset_;
   AddedColumns sums_;
 };
 
-/// The size of the errors of two axes with the largest likelihood; 0 if chance explains them.
+/// The size of the errors of two axes with the largest likelihood. 0 if chance explains them, or an
+/// offset of the ranges that is larger than stated: both bend the volume alike, and such an offset is
+/// a fault to be named (lack_of_fit.hpp).
 double likely_two_axis_errors_m(const RunEffects& effects, const Eigen::MatrixXd& Q,
                                 double factor) {
   constexpr std::array kSizes_m{0.25e-6, 0.5e-6, 1e-6, 2e-6, 4e-6, 8e-6, 16e-6, 32e-6};
   constexpr double kBeyondChance = 25.0;  // of 2 ln L: probability below 1e-5 by chance
-  const double without = effects.estimate(Q, 0.0, factor).twice_log_likelihood;
+  constexpr double kLargeOffset_m = 1e-3;
+  const double without =
+      std::max(effects.estimate(Q, 0.0, factor).twice_log_likelihood,
+               effects.offset_alone(Q, kLargeOffset_m, factor).twice_log_likelihood);
   double best_m = 0.0, best = without + kBeyondChance;
   for (const double s_m : kSizes_m) {
     const double found = effects.estimate(Q, s_m, factor).twice_log_likelihood;

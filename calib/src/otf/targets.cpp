@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "mean_misfit.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/drift_of_runs.hpp"
@@ -329,20 +330,29 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
   }
   FitOfRuns& fit = *found_fit;
   a->U = std::move(fit.U);
-  a->covariance *= fit.all.variance_factor;
   std::optional<FoundMisfit> misfit =
-      misfit_of_runs(runs, fit.residuals, fit.all, a->covariance, a->cofactor_Q);
+      misfit_of_runs(runs, fit.residuals, fit.all,
+                     fit.all.chi2_per_dof * fit.all.correlation * a->covariance, a->cofactor_Q);
+  a->covariance *= fit.all.variance_factor;
   a->covariance += fit.added_covariance;
   add_scales_of_runs(a->covariance, runs, a->cofactor_Q);
   fit.all.iterations = adjustments;
-  if (misfit) {
-    a->covariance += misfit->root_of_covariance * misfit->root_of_covariance.transpose();
-    runs.front().notes.insert(runs.front().notes.end(), misfit->notes.begin(), misfit->notes.end());
-  }
 
-  const Result<VolumetricModel> model = model_of_runs(runs, *a).and_then([&](VolumetricModel m) {
-    return misfit ? m.with_misfit(misfit->misfit) : Result<VolumetricModel>(std::move(m));
-  });
+  Result<VolumetricModel> model = model_of_runs(runs, *a);
+  if (model && misfit) {
+    Adjustment with = *a;
+    with.covariance += misfit->root_of_covariance * misfit->root_of_covariance.transpose();
+    Result<VolumetricModel> other =
+        model_of_runs(runs, with).and_then([&](const VolumetricModel& of_tables) {
+          return of_tables.with_misfit(misfit->misfit);
+        });
+    if (!other || is_notable_misfit(*other)) {
+      model = std::move(other);
+      a = std::move(with);
+      runs.front().notes.insert(runs.front().notes.end(), misfit->notes.begin(),
+                                misfit->notes.end());
+    }
+  }
   if (!model) {
     return tl::unexpected(model.error());
   }

@@ -114,7 +114,7 @@ Features all_features(const Observations& o, const VolumetricModel& model) {
 
   for (std::size_t p = 0; p < o.seen.size(); ++p) {
     const TouchedArtefact& s = o.seen[p];
-    for (std::size_t b = 0; b < s.balls.size(); ++b) {
+    for (std::size_t b = 0; b < std::min(s.balls.size(), s.ball_points_m.size()); ++b) {
       if (s.ball_points_m[b].size() > kUnknownsOfBall) {
         add(p, Feature::Ball, b, of_ball(s, b, model));
       }

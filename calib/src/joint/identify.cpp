@@ -149,8 +149,8 @@ std::vector<std::string> contradictions_of(const std::vector<PairTest>& pairs,
                         pair.explanations.front().log_p >= (1.0 + kRounding) * directed->log_p);
     }
   }
-  if (directed != nullptr && (first || texts.empty())) {
-    texts.insert(texts.begin(), text(directed->test, parts));
+  if (directed != nullptr) {  // it shows which of three parts differs, which a pair does not
+    texts.insert(first ? texts.begin() : texts.end(), text(directed->test, parts));
   }
   return texts;
 }

@@ -9,7 +9,7 @@
 #include "abbe/calib/model_drift.hpp"
 #include "axis_scale_columns.hpp"
 #include "gauge_coordinates.hpp"
-#include "mean_misfit.hpp"
+#include "misfit_in_V.hpp"
 #include "message.hpp"
 
 namespace abbe::calib {

@@ -5,8 +5,8 @@
 
 #include "abbe/calib/basis.hpp"
 #include "abbe/calib/volumetric_model.hpp"
-#include "mean_misfit.hpp"
 #include "message.hpp"
+#include "misfit_in_V.hpp"
 #include "rigid_body_effects.hpp"
 
 namespace abbe::calib {
@@ -29,12 +29,6 @@ Result<void> check(const Misfit& misfit, const VolumetricModel& model) {
   return {};
 }
 
-/// Linear between the nodes, that of the nearest node beyond them.
-double at(std::span<const double> nodes_m, const double* u, double q_m) {
-  const BasisRow row = basis_row(nodes_m, std::clamp(q_m, nodes_m.front(), nodes_m.back()));
-  return row.weight[0] * u[row.first] + row.weight[1] * u[row.first + 1];
-}
-
 }  // namespace
 
 Result<VolumetricModel> VolumetricModel::with_misfit(Misfit misfit) const {
@@ -49,27 +43,40 @@ Result<VolumetricModel> VolumetricModel::with_misfit(Misfit misfit) const {
   return model;
 }
 
+Matrix3 misfit_of_tables_m2(const Misfit& misfit, const ParameterLayout& layout,
+                            const Vector3& axis_position_m, const Vector3& tool_offset_m) {
+  Matrix3 cov_m2 = Matrix3::Zero();
+  if (misfit.u_of_parameters.size() == 0) {
+    return cov_m2;
+  }
+
+  const std::array<Vector3, 3> levers = levers_m(layout.chain(), axis_position_m, tool_offset_m);
+  for (const Table& table : layout.tables()) {
+    const std::size_t a = index(table.motion.axis);
+    const std::vector<double>& nodes_m = layout.nodes()[a].nodes_m;
+    const BasisRow row = basis_row(
+        nodes_m,
+        std::clamp(axis_position_m(static_cast<Eigen::Index>(a)), nodes_m.front(), nodes_m.back()));
+    const auto node = static_cast<Eigen::Index>(table.offset + row.first);
+    const double m = row.weight[0] * misfit.u_of_parameters(node) +
+                     row.weight[1] * misfit.u_of_parameters(node + 1);
+    if (m > 0.0) {
+      const Vector3 moved_m = m * effect(table.motion, levers[a]);
+      cov_m2 += moved_m * moved_m.transpose();
+    }
+  }
+  return cov_m2;
+}
+
 Matrix3 VolumetricModel::misfit_cov_V_m2(const Vector3& axis_position_m,
                                          const Vector3& tool_offset_m) const {
   if (!misfit_) {
     return Matrix3::Zero();
   }
   Matrix3 cov_m2 = misfit_->u_V_m.cwiseAbs2().asDiagonal();
-  if (misfit_->u_of_parameters.size() == 0) {
-    return cov_m2;
-  }
-
-  const ParameterLayout& layout = tables()->layout();
-  const std::array<Vector3, 3> levers =
-      levers_m(layout.chain(), axis_position_m, lever_offset_m(tool_offset_m));
-  for (const Table& table : layout.tables()) {
-    const std::size_t a = index(table.motion.axis);
-    const double m = at(layout.nodes()[a].nodes_m, misfit_->u_of_parameters.data() + table.offset,
-                        axis_position_m(static_cast<Eigen::Index>(a)));
-    if (m > 0.0) {
-      const Vector3 moved_m = m * effect(table.motion, levers[a]);
-      cov_m2 += moved_m * moved_m.transpose();
-    }
+  if (tables() != nullptr) {
+    cov_m2 += misfit_of_tables_m2(*misfit_, tables()->layout(), axis_position_m,
+                                  lever_offset_m(tool_offset_m));
   }
   return cov_m2;
 }

@@ -103,6 +103,33 @@ TEST(JointBar, HasTheErrorsOfItsCalibrationAsEffects) {
   EXPECT_NEAR(part->u_of_effects.front(), 0.2e-6, 1e-12);
 }
 
+/// So are the errors of its expansion and of the thermometer.
+TEST(JointBar, HasTheErrorsOfExpansionAndThermometerAsEffects) {
+  const TripleMachine m = triple_machine(1);
+  const joint::CommonTables common = common_of(m);
+  auto observed = triple_bar(m, common, abbe::tests::mfb::paper_plan());
+  observed.bar.expansion = abbe::calib::Expansivity{11e-6, 0.5e-6};
+  observed.plan.noise.u_common_temperature_K = 0.2;
+  for (auto& pass : observed.passes) {
+    pass.temperature_K = abbe::calib::kReferenceTemperature_K + 1.0;
+  }
+  const auto part = joint::part_of_bar("bar", observed, common, {.bar = "bar.toml"});
+  ASSERT_TRUE(part) << part.error().text;
+  const std::size_t effects = part->effects.size();
+  ASSERT_EQ(part->information.unknowns(), common.basis.size() + effects);
+  EXPECT_EQ(part->effects[effects - 2], "expansion of bar.toml");
+  EXPECT_EQ(part->effects[effects - 1], "thermometer of bar.toml");
+  EXPECT_NEAR(part->u_of_effects[effects - 1], 11e-6 * 0.2, 1e-15);
+  // One K for each u of the expansion, u of the temperature for that of the thermometer: both lengthen
+  // the bar.
+  const auto squared = [&](std::size_t effect) {
+    return part->information.squared_length(common.basis.size() + effect);
+  };
+  const double ratio = 11e-6 * 0.2 / (0.5e-6 * 1.0);
+  EXPECT_NEAR(squared(effects - 1), ratio * ratio * squared(effects - 2),
+              1e-6 * squared(effects - 1));
+}
+
 TEST(JointBar, RefusesObservationsOnOtherNodes) {
   const TripleMachine m = triple_machine(1);
   joint::CommonTables common = common_of(m);

@@ -15,7 +15,7 @@
 #include "check_stopped.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/slow_noise.hpp"
-#include "mean_misfit.hpp"
+#include "misfit_in_V.hpp"
 #include "message.hpp"
 #include "units.hpp"
 

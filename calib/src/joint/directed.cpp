@@ -116,7 +116,7 @@ std::string text(const DirectedTest& t, std::span<const Part> parts) {
   out << parts[t.part].name << ": its " << what
       << (t.difference > 0.0 ? " larger by " : " smaller by ") << std::abs(t.difference) * kUmPerM
       << unit << " (u " << t.u * kUmPerM << unit << ", p " << t.p << ") than those of " << others
-      << ": " << causes(t, parts);
+      << (t.explains ? ": " + causes(t, parts) : "; this alone does not explain their difference");
   return out.str();
 }
 

@@ -13,7 +13,7 @@
 #include "joint/directed.hpp"
 #include "joint/explanations.hpp"
 #include "joint/pair_problem.hpp"
-#include "mean_misfit.hpp"
+#include "misfit_in_V.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::joint {

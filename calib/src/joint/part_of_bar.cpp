@@ -208,14 +208,21 @@ Result<Part> part_of_bar(std::string name, const mfb::Observations& o, const Com
              message("scale of ", letter(a)), u);
     }
   }
-  const Eigen::MatrixXd& calibration_m = system->shared.bar_root();
+  const mfb::SharedUnknowns& shared = system->shared;
+  const auto of_bar = [&](Eigen::Index unknown) {
+    return Eigen::MatrixXd(rows->of_bar.col(unknown - shared.parameters()));
+  };
+  const Eigen::MatrixXd& calibration_m = shared.bar_root();
   for (Eigen::Index k = 0; k < calibration_m.cols(); ++k) {
-    append(rows->of_bar.col(k), message("calibration ", k + 1, " of ", options.bar),
+    append(of_bar(shared.bar_offset() + k), message("calibration ", k + 1, " of ", options.bar),
            calibration_m.col(k).norm());
   }
-  if (system->shared.alphas() > 0) {
-    append(rows->of_bar.rightCols<1>(), "expansion of " + options.bar,
-           system->shared.u_alpha_per_K());
+  if (shared.alphas() > 0) {
+    append(of_bar(shared.alpha_offset()), "expansion of " + options.bar, shared.u_alpha_per_K());
+  }
+  if (shared.temperatures() > 0) {
+    append(of_bar(shared.temperature_offset()), "thermometer of " + options.bar,
+           shared.growth_of_temperature());
   }
 
   eliminate(rows->of_left_out, A, rows->y);

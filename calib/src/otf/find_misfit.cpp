@@ -4,9 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "abbe/calib/basis.hpp"
 #include "message.hpp"
+#include "misfit_in_V.hpp"
 #include "otf/repeated_residuals.hpp"
-#include "rigid_body_effects.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::otf {
@@ -22,10 +23,8 @@ struct PlaceInCell {
 };
 
 PlaceInCell place_in(const std::vector<double>& nodes_m, double q_m) {
-  const auto next = std::upper_bound(nodes_m.begin() + 1, nodes_m.end() - 1, q_m);
-  const auto cell = static_cast<std::size_t>(next - nodes_m.begin()) - 1;
-  const double share = (q_m - nodes_m[cell]) / (nodes_m[cell + 1] - nodes_m[cell]);
-  return {cell, std::clamp(share, 0.0, 1.0)};
+  const BasisRow row = basis_row(nodes_m, std::clamp(q_m, nodes_m.front(), nodes_m.back()));
+  return {row.first, row.weight[1]};
 }
 
 std::vector<Table> tables_of(const ParameterLayout& layout, Axis axis) {
@@ -106,26 +105,17 @@ void set_at_nodes(Misfit& misfit, const Table& table, const Eigen::VectorXd& var
 
 /// Mean over the rows of the variances of V that the misfit of the tables causes.
 Vector3 mean_of_tables_m2(const Misfit& misfit, std::span<const ResidualsOfRun> runs) {
-  Vector3 sum = Vector3::Zero();
+  Vector3 sum_m2 = Vector3::Zero();
   double rows = 0.0;
   for (const ResidualsOfRun& run : runs) {
-    const ParameterLayout& layout = run.o.layout();
     for (const Observation& row : run.o.rows) {
-      const std::array<Vector3, 3> levers =
-          levers_m(layout.chain(), row.axis_position_m, run.o.target_offset_m);
-      for (const Table& table : layout.tables()) {
-        const std::size_t a = index(table.motion.axis);
-        const PlaceInCell at =
-            place_in(layout.nodes()[a].nodes_m, row.axis_position_m(static_cast<Eigen::Index>(a)));
-        const auto node = static_cast<Eigen::Index>(table.offset + at.cell);
-        const double m = (1.0 - at.share) * misfit.u_of_parameters(node) +
-                         at.share * misfit.u_of_parameters(node + 1);
-        sum += (m * effect(table.motion, levers[a])).cwiseAbs2();
-      }
+      sum_m2 +=
+          misfit_of_tables_m2(misfit, run.o.layout(), row.axis_position_m, run.o.target_offset_m)
+              .diagonal();
       rows += 1.0;
     }
   }
-  return sum / std::max(1.0, rows);
+  return sum_m2 / std::max(1.0, rows);
 }
 
 Eigen::MatrixXd joined(const std::vector<Eigen::MatrixXd>& parts, Eigen::Index rows) {
@@ -147,7 +137,7 @@ std::string note_on(const Table& table, const AxisNodes& axis, const Eigen::Vect
   const double mean = variances.mean();
   Eigen::Index most = 0;
   const double largest = variances.maxCoeff(&most);
-  std::string text = message(name(table.motion), " ", 1e6 * std::sqrt(mean),
+  std::string text = message(name(table.motion), " ", kUmPerM * std::sqrt(mean),
                              is_rotation(table.motion.motion) ? " urad rms" : " um rms");
   constexpr double kOneCell = 4.0;  // of the mean
   if (largest > kOneCell * mean && variances.size() > 1) {
@@ -187,8 +177,8 @@ class Finder {
     const std::vector<Table> tables = tables_of(layout_, axis);
     const RepeatedResiduals repeated(places_of_axis(layout_, axis), runs_,
                                      static_cast<std::size_t>(Q_.rows()));
-    const Variances v = repeated.variances(of_noise_);
-    if (!v.any()) {
+    const Eigen::MatrixXd of_cells = repeated.variances(of_noise_);
+    if (of_cells.isZero(0.0)) {
       return;
     }
     const AxisNodes& nodes = layout_.nodes()[index(axis)];
@@ -197,18 +187,16 @@ class Finder {
     std::string text;
     double length_m = 0.0;
     for (std::size_t t = 0; t < tables.size(); ++t) {
-      const Eigen::VectorXd variances = v.of_cell.row(static_cast<Eigen::Index>(t));
+      const Eigen::VectorXd variances = of_cells.row(static_cast<Eigen::Index>(t));
       if (!(variances.maxCoeff() > 0.0)) {
         continue;
       }
       set_at_nodes(found_.misfit, tables[t], variances);
-      if (v.is_significant[t]) {
-        text += (text.empty() ? "" : "; ") + note_on(tables[t], nodes, variances);
-        const double stays_m = section_m * repeated.length_in_sections(v, t);
-        length_m = length_m > 0.0 ? std::min(length_m, stays_m) : stays_m;
-      }
+      text += (text.empty() ? "" : "; ") + note_on(tables[t], nodes, variances);
+      const double stays_m = section_m * repeated.length_in_sections(of_cells, t);
+      length_m = length_m > 0.0 ? std::min(length_m, stays_m) : stays_m;
     }
-    roots_.push_back(repeated.root_of_covariance(v, Q_));
+    roots_.push_back(repeated.root_of_covariance(of_cells, Q_));
     double& all_m = found_.misfit.table_length_m;
     all_m = all_m > 0.0 ? std::min(all_m, length_m) : length_m;
     // A wave falls to one half of its correlation after a sixth of its length.
@@ -221,21 +209,18 @@ class Finder {
   void add_volume() {
     const RepeatedResiduals repeated(places_of_volume(layout_), runs_,
                                      static_cast<std::size_t>(Q_.rows()));
-    Variances v = repeated.variances(of_noise_);
-    const Vector3 of_tables_m2 = mean_of_tables_m2(found_.misfit, runs_);
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      v.of_cell(c, 0) = std::max(0.0, v.of_cell(c, 0) - of_tables_m2(c));
-    }
-    if (!v.any()) {
+    Eigen::MatrixXd of_V_m2 = repeated.variances(of_noise_);
+    of_V_m2.col(0) -= mean_of_tables_m2(found_.misfit, runs_);
+    of_V_m2 = of_V_m2.cwiseMax(0.0).eval();
+    if (of_V_m2.isZero(0.0)) {
       return;
     }
-    found_.misfit.u_V_m = v.of_cell.col(0).cwiseSqrt();
+    found_.misfit.u_V_m = of_V_m2.col(0).cwiseSqrt();
     found_.misfit.V_length_m = mean_node_distance_m();
-    roots_.push_back(repeated.root_of_covariance(v, Q_));
+    roots_.push_back(repeated.root_of_covariance(of_V_m2, Q_));
     found_.notes.push_back(
-        message("the machine has errors that depend on several axes at once or on a rotation that "
-                "is not in "
-                "the model: (",
+        message("the machine has errors that depend on several axes at once, or on a rotation that "
+                "is not in the model: (",
                 kUmPerM * found_.misfit.u_V_m.transpose(),
                 ") um rms in X, Y, Z; no table represents them; they are in the uncertainty"));
   }

@@ -32,7 +32,7 @@ Result<Solution> solve_smooth(Observations& o, const RowInformation& rows, const
     return solution;
   }
 
-  const bool has_run_effects = o.drift || o.u_range_offset_m > 0.0;
+  const bool has_run_effects = o.drift || o.u_range_offset_m > 0.0 || solution->two_axes;
   const RowInformation judged =
       has_run_effects ? information_of(without_run_effects(o, *solution)) : rows;
   const Result<Smoothness> chosen = permitted_smoothness(

@@ -12,7 +12,7 @@
 #include "check_stopped.hpp"
 #include "chi2_bound.hpp"
 #include "elementary.hpp"
-#include "mean_misfit.hpp"
+#include "misfit_in_V.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/alternative_columns.hpp"

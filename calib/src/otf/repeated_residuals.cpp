@@ -101,10 +101,6 @@ Eigen::VectorXd not_negative(const Eigen::MatrixXd& K, const Eigen::VectorXd& q)
 
 }  // namespace
 
-bool Variances::any() const {
-  return of_cell.size() > 0 && of_cell.maxCoeff() > 0.0;
-}
-
 RepeatedResiduals::RepeatedResiduals(const Places& places, std::span<const ResidualsOfRun> runs,
                                      std::size_t unknowns)
     : components_(places.components),
@@ -203,8 +199,9 @@ bool RepeatedResiduals::are_independent(const OfLeg& a, const OfLeg& b) const {
   return g.run != h.run || (a.leg != b.leg && std::abs(g.time - h.time) > g.far);
 }
 
-Variances RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) const {
-  // Far above what a normal distribution would need: with few legs the sums have heavier tails.
+Eigen::MatrixXd RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) const {
+  // In standard deviations. Far above what a normal distribution would need: with few legs the sums
+  // have heavier tails.
   constexpr double kSureOfAll = 6.0, kSureOfCell = 7.0, kLikely = 2.0;
   const auto n = static_cast<Eigen::Index>(components_);
   const auto cells = static_cast<Eigen::Index>(cells_);
@@ -243,35 +240,33 @@ Variances RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) const {
     all += products;
   }
 
-  Variances v{Eigen::MatrixXd::Zero(n, cells), std::vector<bool>(components_, false)};
-  bool any = false;
+  Eigen::MatrixXd variances = Eigen::MatrixXd::Zero(n, cells);
+  bool beyond_chance = deviations.maxCoeff() > kSureOfCell;
   for (std::size_t c = 0; c < components_; ++c) {
-    const auto row = deviations.row(static_cast<Eigen::Index>(c));
-    v.is_significant[c] = all.deviations(c) > kSureOfAll || row.maxCoeff() > kSureOfCell;
-    any = any || v.is_significant[c];
+    beyond_chance = beyond_chance || all.deviations(c) > kSureOfAll;
   }
-  if (!any) {
-    return v;
+  if (!beyond_chance) {
+    return variances;
   }
   for (Eigen::Index cell = 0; cell < cells; ++cell) {
     const Eigen::VectorXd found = not_negative(K[static_cast<std::size_t>(cell)], q.col(cell));
     for (std::size_t c = 0; c < components_; ++c) {
       const auto k = static_cast<Eigen::Index>(c);
       if (all.deviations(c) > kLikely || deviations(k, cell) > kSureOfCell) {
-        v.of_cell(k, cell) = found(k);
+        variances(k, cell) = found(k);
       }
     }
   }
-  return v;
+  return variances;
 }
 
-Eigen::MatrixXd RepeatedResiduals::root_of_covariance(const Variances& v,
+Eigen::MatrixXd RepeatedResiduals::root_of_covariance(const Eigen::MatrixXd& variances,
                                                       const Eigen::MatrixXd& Q) const {
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t s = 0; s < sections_.size(); ++s) {
     for (std::size_t c = 0; c < components_; ++c) {
       const auto k = static_cast<Eigen::Index>(c);
-      const double variance = v.of_cell(k, static_cast<Eigen::Index>(cell_of_[s]));
+      const double variance = variances(k, static_cast<Eigen::Index>(cell_of_[s]));
       if (variance <= 0.0 || sections_[s].empty()) {
         continue;
       }
@@ -291,10 +286,11 @@ Eigen::MatrixXd RepeatedResiduals::root_of_covariance(const Variances& v,
   return root;
 }
 
-double RepeatedResiduals::length_in_sections(const Variances& v, std::size_t component) const {
+double RepeatedResiduals::length_in_sections(const Eigen::MatrixXd& variances,
+                                             std::size_t component) const {
   const auto k = static_cast<Eigen::Index>(component);
   std::vector<double> value(sections_.size(), 0.0);
-  double variances = 0.0, used = 0.0;
+  double sum = 0.0, used = 0.0;
   for (std::size_t s = 0; s < sections_.size(); ++s) {
     double b = 0.0, n = 0.0;
     for (const OfLeg& leg : sections_[s]) {
@@ -303,11 +299,11 @@ double RepeatedResiduals::length_in_sections(const Variances& v, std::size_t com
     }
     value[s] = n > 0.0 ? b / n : 0.0;
     if (n > 0.0) {
-      variances += v.of_cell(k, static_cast<Eigen::Index>(cell_of_[s]));
+      sum += variances(k, static_cast<Eigen::Index>(cell_of_[s]));
       used += 1.0;
     }
   }
-  const double variance = variances / std::max(1.0, used);
+  const double variance = sum / std::max(1.0, used);
   double before = 1.0;
   for (std::size_t lag = 1; lag < sections_.size(); ++lag) {
     double products = 0.0;

@@ -11,7 +11,7 @@
 
 namespace abbe::calib::otf {
 
-/// How one component of the misfit moves a row: the sums over its entries at `table`.
+/// The place of a row.
 struct Section {
   std::size_t index = 0;  ///< of the place
   std::size_t cell = 0;   ///< to which the place belongs; misfit has one variance for each cell
@@ -25,26 +25,21 @@ struct Places {
   std::function<void(const Observations&, std::size_t row, Eigen::Ref<Eigen::VectorXd> x)> effect;
 };
 
-/// Misfit variances by component and cell, in the square of the unit of the component.
-struct Variances {
-  Eigen::MatrixXd of_cell;           ///< components x cells; 0 if not found
-  std::vector<bool> is_significant;  ///< by component
-  [[nodiscard]] bool any() const;
-};
-
 class RepeatedResiduals {
  public:
   RepeatedResiduals(const Places& places, std::span<const ResidualsOfRun> runs,
                     std::size_t unknowns);
 
-  /// `of_noise`: see find_misfit().
-  [[nodiscard]] Variances variances(const Eigen::MatrixXd& of_noise) const;
+  /// Variances of the misfit, components x cells, in the square of the unit of the component; 0 where
+  /// chance explains the residuals. `of_noise`: see find_misfit().
+  [[nodiscard]] Eigen::MatrixXd variances(const Eigen::MatrixXd& of_noise) const;
   /// Effect of the misfit of each section on the unknowns: root of the covariance that it adds.
-  [[nodiscard]] Eigen::MatrixXd root_of_covariance(const Variances&,
+  [[nodiscard]] Eigen::MatrixXd root_of_covariance(const Eigen::MatrixXd& variances,
                                                    const Eigen::MatrixXd& Q) const;
   /// Number of sections over which the values of a component stay alike: their correlation falls to
   /// one half.
-  [[nodiscard]] double length_in_sections(const Variances&, std::size_t component) const;
+  [[nodiscard]] double length_in_sections(const Eigen::MatrixXd& variances,
+                                          std::size_t component) const;
 
  private:
   /// Sums over the rows of a leg in a section. B has few columns that are not zero.

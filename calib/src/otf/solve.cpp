@@ -9,7 +9,7 @@
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "check_stopped.hpp"
-#include "mean_misfit.hpp"
+#include "misfit_in_V.hpp"
 #include "message.hpp"
 #include "otf/find_misfit.hpp"
 #include "otf/row_residuals.hpp"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "mean_misfit.hpp"
+#include "misfit_in_V.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/drift_of_runs.hpp"

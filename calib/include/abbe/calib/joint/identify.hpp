@@ -141,8 +141,8 @@ struct JointIdentification {
   /// nullopt if a test found a contradiction: parts are never averaged then.
   std::optional<JointModel> joint;
   /// First the most significant directed test, if it explains all and fits better than any other
-  /// explanation; then each pair: "run 1 and array contradict each other: chi-square ...". Without
-  /// contradicting pairs the most significant directed test.
+  /// explanation; then each pair: "run 1 and array contradict each other: chi-square ..."; then the
+  /// most significant directed test, if it is not the first.
   std::vector<std::string> contradictions;
 };
 /// Tests all pairs and directions, and computes the model if there is no contradiction. A

@@ -144,8 +144,9 @@ struct Synchronisation {
 
 /// The fit of which the model was made, for with_misfit().
 struct FitOfRows {
-  Eigen::VectorXd U;                    ///< of all unknowns of Observations
-  std::vector<double> residual_m;       ///< of the rows, without range offset and drift
+  Eigen::VectorXd U;  ///< of all unknowns of Observations
+  /// Of the rows, without range offset, drift and errors of two axes.
+  std::vector<double> residual_m;
   Eigen::MatrixXd covariance_of_noise;  ///< of U, as far as the noise of the rows causes it
   /// Over which the noise is correlated, s; for blocks without times in units of a block.
   double correlation_time = 0.0;

@@ -6,6 +6,12 @@
 
 namespace abbe::calib {
 
+/// Covariance of V that the misfit of the tables causes: sum of m_T^2 g_T g_T^T (misfit.hpp). m_T is
+/// linear between the nodes; beyond them it is that of the nearest node.
+[[nodiscard]] Matrix3 misfit_of_tables_m2(const Misfit&, const ParameterLayout&,
+                                          const Vector3& axis_position_m,
+                                          const Vector3& tool_offset_m);
+
 /// Mean over the axis positions of the variance of V (trace) that the misfit of the model causes,
 /// for its first tool offset.
 [[nodiscard]] double mean_misfit_m2(const VolumetricModel&, std::span<const Vector3> places_m);

@@ -6,6 +6,9 @@
 #include <limits>
 #include <optional>
 
+#include "chi2_tail.hpp"
+#include "elementary.hpp"
+
 namespace abbe::calib::otf {
 namespace {
 
@@ -27,6 +30,24 @@ class Products {
   [[nodiscard]] double deviations(std::size_t component) const {
     const double squares = sums_[component].squaredNorm();
     return squares > 0.0 ? sums_[component].sum() / std::sqrt(squares) : 0.0;
+  }
+  /// Natural logarithm of the probability of a larger sum by chance, where every leg has one sign or
+  /// the other, for all its sections together. The sum has the standard deviation s of deviations()
+  /// and, with P the symmetric matrix of the products, the third moment tr(P^3): it has nearly the
+  /// distribution of (chi-square - k) s / sqrt(2 k) with k = 8 s^6 / tr(P^3)^2 degrees of freedom. Few
+  /// legs that are alike have k = 1, and tails far heavier than a normal distribution.
+  [[nodiscard]] double log_p(std::size_t component) const {
+    constexpr double kNotRare = 3.0, kMostDegrees = 1e4;
+    const double d = deviations(component);
+    if (d < kNotRare) {
+      return 0.0;
+    }
+    const Eigen::MatrixXd P = sums_[component] + sums_[component].transpose();
+    const double third = (P * P).cwiseProduct(P).sum(), s = sums_[component].norm();
+    const double k = third > 0.0 ? 8.0 * (s * s * s / third) * (s * s * s / third) : kMostDegrees;
+    const double degrees = std::floor(std::clamp(k, 1.0, kMostDegrees));
+    return log_chi2_tail(degrees + d * std::sqrt(2.0 * degrees),
+                         static_cast<std::size_t>(degrees));
   }
   Products& operator+=(const Products& other) {
     for (std::size_t c = 0; c < sums_.size(); ++c) {
@@ -200,14 +221,16 @@ bool RepeatedResiduals::are_independent(const OfLeg& a, const OfLeg& b) const {
 }
 
 Eigen::MatrixXd RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) const {
-  // In standard deviations. Far above what a normal distribution would need: with few legs the sums
-  // have heavier tails.
-  constexpr double kSureOfAll = 6.0, kSureOfCell = 7.0, kLikely = 2.0;
+  // Probabilities by chance: of a component in all cells, and in one of many cells.
+  constexpr double kChanceOfAll = 1e-4, kChanceOfCell = 1e-5;
+  constexpr double kLikely = 2.0;  // standard deviations
+  const double log_all = natural_logarithm(kChanceOfAll),
+               log_cell = natural_logarithm(kChanceOfCell);
   const auto n = static_cast<Eigen::Index>(components_);
   const auto cells = static_cast<Eigen::Index>(cells_);
   Products all(components_, legs_.size());
   std::vector<Eigen::MatrixXd> K(cells_, Eigen::MatrixXd::Zero(n, n));
-  Eigen::MatrixXd q = Eigen::MatrixXd::Zero(n, cells), deviations = q;
+  Eigen::MatrixXd q = Eigen::MatrixXd::Zero(n, cells), log_p = q;
 
   for (std::size_t cell = 0; cell < cells_; ++cell) {
     Products products(components_, legs_.size());
@@ -234,16 +257,15 @@ Eigen::MatrixXd RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) co
       }
     }
     for (std::size_t c = 0; c < components_; ++c) {
-      deviations(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(cell)) =
-          products.deviations(c);
+      log_p(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(cell)) = products.log_p(c);
     }
     all += products;
   }
 
   Eigen::MatrixXd variances = Eigen::MatrixXd::Zero(n, cells);
-  bool beyond_chance = deviations.maxCoeff() > kSureOfCell;
+  bool beyond_chance = log_p.minCoeff() < log_cell;
   for (std::size_t c = 0; c < components_; ++c) {
-    beyond_chance = beyond_chance || all.deviations(c) > kSureOfAll;
+    beyond_chance = beyond_chance || all.log_p(c) < log_all;
   }
   if (!beyond_chance) {
     return variances;
@@ -252,7 +274,7 @@ Eigen::MatrixXd RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) co
     const Eigen::VectorXd found = not_negative(K[static_cast<std::size_t>(cell)], q.col(cell));
     for (std::size_t c = 0; c < components_; ++c) {
       const auto k = static_cast<Eigen::Index>(c);
-      if (all.deviations(c) > kLikely || deviations(k, cell) > kSureOfCell) {
+      if (all.deviations(c) > kLikely || log_p(k, cell) < log_cell) {
         variances(k, cell) = found(k);
       }
     }

@@ -1,4 +1,5 @@
-/// Runs of one tracker with one offset of its ranges (joint/part.hpp, SharedRangeOffset).
+/// Runs of one tracker with one offset of its ranges, in a joint identification (joint/part.hpp,
+/// SharedRangeOffset) and in updates of a model (model_update.hpp).
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/calib/model_update.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -16,19 +18,20 @@ namespace otf = abbe::calib::otf;
 using abbe::calib::VolumetricModel;
 using abbe::tests::otf::MadeRun;
 using abbe::tests::otf::make_run;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
 constexpr double kUOffset_m = 50e-6;
 
-/// A run whose ranges are all too long by `offset_m`, with the prior kUOffset_m.
-MadeRun run_with_offset(double offset_m, unsigned noise_seed) {
+/// A run whose ranges are all too long by `offset_m`, with the prior `u_m`.
+MadeRun run_with_offset(double offset_m, unsigned noise_seed, double u_m = kUOffset_m) {
   MadeRun run =
       make_run({.seed = 3, .noise_seed = noise_seed, .error_scale_m = 10e-6, .in_gauge = true});
   for (otf::TrackerObservation& sample : run.samples) {
     sample.p_tracker_m *= 1.0 + offset_m / sample.p_tracker_m.norm();
   }
-  run.noise.u_range_offset_m = kUOffset_m;
+  run.noise.u_range_offset_m = u_m;
   return run;
 }
 
@@ -144,6 +147,88 @@ TEST(SharedRangeOffset, NeedsAnEstimateOfTheRun) {
                                        {.range_offset = joint::SharedRangeOffset{"home 1", {}}});
   ASSERT_FALSE(part);
   EXPECT_THAT(part.error().text, HasSubstr("run has no estimate of the range offset 'home 1'"));
+}
+
+abbe::calib::ModelWithOffset with_offset(const otf::Solution& solution) {
+  return {solution.model, solution.offset_in_model};
+}
+
+double squared_normalised_error(const VolumetricModel& model, const MadeRun& truth) {
+  const Eigen::VectorXd error = model.U() - truth.truth;
+  const auto inverse = model.covariance().completeOrthogonalDecomposition();
+  return error.dot(inverse.solve(error)) / static_cast<double>(inverse.rank());
+}
+
+TEST(RangeOffsetOfUpdates, IsThatOfTheJointIdentification) {
+  const otf::Solution one = solution_of(run_with_offset(30e-6, 1)),
+                      two = solution_of(run_with_offset(30e-6, 2));
+  const joint::CommonTables common = *joint::tables_of(one.model);
+  const std::vector parts{part_of("run 1", one, common, "home 1"),
+                          part_of("run 2", two, common, "home 1")};
+  const auto joint = joint::joint_model(parts, common);
+  const auto updated = update_model(with_offset(one), with_offset(two), {});
+  ASSERT_TRUE(joint) << joint.error().text;
+  ASSERT_TRUE(updated) << updated.error().text;
+
+  EXPECT_LT(difference_in_u(joint->model, updated->model), 1e-6);
+  const Eigen::VectorXd u = joint->model.covariance().diagonal().cwiseSqrt();
+  EXPECT_LT((updated->model.U() - joint->model.U())
+                .cwiseQuotient(u.cwiseMax(1e-12))
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-5);
+  ASSERT_TRUE(updated->range_offset);
+  EXPECT_NEAR(updated->range_offset->value_m, joint->effects[0].value * kUOffset_m, 1e-10);
+  EXPECT_NEAR(updated->range_offset->u_m, joint->effects[0].u * kUOffset_m, 1e-10);
+}
+
+/// Runs from one place, which determine the offset hardly better than its prior: one that counts as
+/// new in each of them would seem to average out.
+TEST(RangeOffsetOfUpdates, DoesNotAverageOut) {
+  constexpr double kU_m = 0.3e-6, kOffset_m = 0.45e-6;
+  constexpr unsigned kRuns = 20;
+  const MadeRun first = run_with_offset(kOffset_m, 1, kU_m);
+  abbe::calib::ModelWithOffset with = with_offset(solution_of(first)), without{with.model};
+  for (unsigned k = 2; k <= kRuns; ++k) {
+    const otf::Solution run = solution_of(run_with_offset(kOffset_m, k, kU_m));
+    auto updated = update_model(with, with_offset(run), {});
+    ASSERT_TRUE(updated) << updated.error().text;
+    with = *std::move(updated);
+    without = *update_model(without, {run.model}, {});
+  }
+  const double kept = squared_normalised_error(with.model, first),
+               lost = squared_normalised_error(without.model, first);
+  RecordProperty("kept", std::to_string(kept));
+  RecordProperty("lost", std::to_string(lost));
+  EXPECT_NEAR(kept, 1.0, 0.5);
+  EXPECT_GT(lost, 1.5 * kept);
+  EXPECT_NEAR(with.range_offset->value_m, kOffset_m, 4.0 * with.range_offset->u_m);
+}
+
+TEST(RangeOffsetOfUpdates, OfAnotherPlaceIsNotTheSame) {
+  const otf::Solution one = solution_of(run_with_offset(60e-6, 1)),
+                      two = solution_of(run_with_offset(-60e-6, 2));
+  const auto refused = update_model(with_offset(one), with_offset(two), {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, abbe::calib::ErrorCode::NotApplicable);
+  EXPECT_THAT(refused.error().text, HasSubstr("give the place a new name"));
+
+  // Under its new name, and for a run that states no offset, the covariance contains it.
+  const auto new_place = update_model({one.model}, with_offset(two), {});
+  ASSERT_TRUE(new_place) << new_place.error().text;
+  EXPECT_NEAR(new_place->range_offset->value_m, -60e-6, 4.0 * new_place->range_offset->u_m);
+  const auto without = update_model(with_offset(one), {two.model}, {});
+  ASSERT_TRUE(without) << without.error().text;
+  EXPECT_FALSE(without->range_offset);
+}
+
+TEST(RangeOffsetOfUpdates, OfAnotherNumberOfParametersIsRefused) {
+  const otf::Solution run = solution_of(run_with_offset(60e-6, 1));
+  auto damaged = with_offset(run);
+  damaged.range_offset->dU_dd.conservativeResize(3);
+  const auto refused = update_model(damaged, with_offset(run), {});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("3 derivatives for "));
 }
 
 }  // namespace

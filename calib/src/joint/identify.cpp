@@ -13,8 +13,8 @@
 #include "joint/directed.hpp"
 #include "joint/explanations.hpp"
 #include "joint/pair_problem.hpp"
-#include "misfit_in_V.hpp"
 #include "message.hpp"
+#include "misfit_in_V.hpp"
 
 namespace abbe::calib::joint {
 namespace {

@@ -9,6 +9,7 @@
 #include "gauge_coordinates.hpp"
 #include "joint/left_out_rotations.hpp"
 #include "message.hpp"
+#include "offset_of_data.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::joint {
@@ -44,7 +45,7 @@ SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects&
     add(u, u, of_axis.col(static_cast<Eigen::Index>(index(a))), message("scale of ", letter(a)));
   }
   if (e.range_offset) {
-    const otf::OffsetInModel& of_run = e.range_offset->of_run;
+    const OffsetInModel& of_run = e.range_offset->of_run;
     add(of_run.u_prior_m, of_run.u_m, of_run.dU_dd, "offset of the ranges " + e.range_offset->name);
   }
   shared.G.conservativeResize(Eigen::NoChange, columns);
@@ -53,19 +54,14 @@ SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects&
 }
 
 /// What the data of the run, without the prior, state about its range offset d, in units of its
-/// prior. The estimate with the prior has the information 1/u^2 = s^2 + 1/u_prior^2 and the value
-///     d = s^2 d_data u^2
-void add_offset_of_data(estimation::Information& information, const otf::OffsetInModel& of_run,
+/// prior.
+void add_offset_of_data(estimation::Information& information, const OffsetInModel& of_run,
                         Eigen::Index column) {
-  constexpr double kNothing = 1e-9;  // rounding of 1 - u^2 / u_prior^2
-  const double u2 = of_run.u_m * of_run.u_m, prior2 = of_run.u_prior_m * of_run.u_prior_m,
-               s2 = 1.0 / u2 - 1.0 / prior2;
-  if (s2 * u2 > kNothing) {
-    const double s = std::sqrt(s2);
+  if (const std::optional<OffsetOfData> data = of_data(of_run)) {
     Eigen::MatrixXd row =
         Eigen::MatrixXd::Zero(1, static_cast<Eigen::Index>(information.unknowns()));
-    row(0, column) = s * of_run.u_prior_m;
-    information.add_rows(row, Eigen::VectorXd::Constant(1, of_run.value_m / (u2 * s)));
+    row(0, column) = of_run.u_prior_m / data->u_m;
+    information.add_rows(row, Eigen::VectorXd::Constant(1, data->value_m / data->u_m));
   }
 }
 
@@ -75,7 +71,7 @@ Result<void> check_offset(const std::string& part, const CommonEffects& effects,
   if (!shared) {
     return {};
   }
-  const otf::OffsetInModel& of_run = shared->of_run;
+  const OffsetInModel& of_run = shared->of_run;
   if (of_run.u_prior_m > 0.0 && of_run.u_m > 0.0 && of_run.dU_dd.squaredNorm() > 0.0 &&
       of_run.dU_dd.size() == static_cast<Eigen::Index>(common.basis.size())) {
     return {};

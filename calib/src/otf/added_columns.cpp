@@ -102,8 +102,9 @@ AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q, double l
   }
 
   e.d = scale.asDiagonal() * d;
-  e.u = (scale.asDiagonal() * root).rowwise().norm();
-  e.root_cov_dU = QAWC * scale.asDiagonal() * root;
+  e.root_cov_d = scale.asDiagonal() * root;
+  e.u = e.root_cov_d.rowwise().norm();
+  e.root_cov_dU = QAWC * e.root_cov_d;
   e.dU = QAWC * e.d;
 
   return e;
@@ -131,9 +132,9 @@ AddedColumns::Estimate AddedColumns::estimate_with_priors(const Eigen::MatrixXd&
   for (Eigen::Index i = 0; i < k; ++i) {
     e.twice_log_likelihood -= 2.0 * natural_logarithm(u(i) * llt.matrixLLT()(i, i));
   }
-  const Eigen::MatrixXd root = llt.matrixU().solve(Eigen::MatrixXd::Identity(k, k));
-  e.u = root.rowwise().norm();
-  e.root_cov_dU = QAWC * root;
+  e.root_cov_d = llt.matrixU().solve(Eigen::MatrixXd::Identity(k, k));
+  e.u = e.root_cov_d.rowwise().norm();
+  e.root_cov_dU = QAWC * e.root_cov_d;
   e.dU = QAWC * e.d;
 
   return e;

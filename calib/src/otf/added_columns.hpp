@@ -36,7 +36,8 @@ class AddedColumns {
     Eigen::VectorXd d;            ///< coefficient of each added column
     Eigen::VectorXd u;            ///< standard uncertainty of d
     Eigen::VectorXd dU;           ///< Q A^T W^2 C d: error of U if the columns are left out
-    Eigen::MatrixXd root_cov_dU;  ///< root of the covariance of dU: covariance = root root^T
+    Eigen::MatrixXd root_cov_d;   ///< root of the covariance of d: covariance = root root^T
+    Eigen::MatrixXd root_cov_dU;  ///< of the covariance of dU, and with root_cov_d of both
     /// With a prior: 2 ln of the marginal likelihood, relative to that without the columns.
     double twice_log_likelihood = 0.0;
   };

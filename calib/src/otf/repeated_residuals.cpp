@@ -46,8 +46,7 @@ class Products {
     const double third = (P * P).cwiseProduct(P).sum(), s = sums_[component].norm();
     const double k = third > 0.0 ? 8.0 * (s * s * s / third) * (s * s * s / third) : kMostDegrees;
     const double degrees = std::floor(std::clamp(k, 1.0, kMostDegrees));
-    return log_chi2_tail(degrees + d * std::sqrt(2.0 * degrees),
-                         static_cast<std::size_t>(degrees));
+    return log_chi2_tail(degrees + d * std::sqrt(2.0 * degrees), static_cast<std::size_t>(degrees));
   }
   Products& operator+=(const Products& other) {
     for (std::size_t c = 0; c < sums_.size(); ++c) {

@@ -9,8 +9,8 @@
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "check_stopped.hpp"
-#include "misfit_in_V.hpp"
 #include "message.hpp"
+#include "misfit_in_V.hpp"
 #include "otf/find_misfit.hpp"
 #include "otf/row_residuals.hpp"
 #include "otf/run_statistics.hpp"

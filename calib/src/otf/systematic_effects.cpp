@@ -75,9 +75,6 @@ class RunEffects {
     return sums_.first(1).estimate_with_prior(Q, u_m, factor);
   }
   [[nodiscard]] bool has_offset() const { return o_.u_range_offset_m > 0.0; }
-  [[nodiscard]] AddedColumns::Reduced reduced(const Eigen::MatrixXd& Q) const {
-    return sums_.reduced(Q);
-  }
 
  private:
   static constexpr std::size_t kColumns = 1 + kTwoAxisErrors;
@@ -147,9 +144,10 @@ WithRunEffects with_run_effects(const Observations& o, const WhitenedRows& rows,
   if (effects.has_offset()) {
     with.offset = {e.d(0), e.u(0)};
     left = without_range_offset(std::move(left), with.offset.value_m);
-    with.in_model = OffsetInModel{.dU_dd = effects.reduced(a.cofactor_Q)
-                                               .dU_dd.col(0)
-                                               .head(static_cast<Eigen::Index>(o.basis.size())),
+    // Covariance of U and the offset, over the variance of the offset: with the other effects free.
+    const Eigen::VectorXd dU_dd =
+        e.root_cov_dU * e.root_cov_d.row(0).transpose() / (e.u(0) * e.u(0));
+    with.in_model = OffsetInModel{.dU_dd = dU_dd.head(static_cast<Eigen::Index>(o.basis.size())),
                                   .value_m = with.offset.value_m,
                                   .u_m = with.offset.u_m,
                                   .u_prior_m = o.u_range_offset_m};

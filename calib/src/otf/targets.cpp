@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
-#include "misfit_in_V.hpp"
 #include "message.hpp"
+#include "misfit_in_V.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/drift_of_runs.hpp"
 #include "otf/find_misfit.hpp"

@@ -21,11 +21,19 @@
 /// What runs have in common does not average out. State it as G, or a hundred runs claim a tenth of
 /// an uncertainty that is the same in all of them. Not in G, and therefore too small after many
 /// runs: errors between the nodes, bending, temperatures that are always wrong by the same amount.
+///
+/// Runs from one place of a tracker have one range offset d. Where both models state it
+/// (OffsetInModel), d is an unknown beside e, with Cov given d, and its prior counts once:
+///     W (e + N^T dU_dd d) = W N^T (U + dU_dd value)   for each model
+///     d / u = value / u                               of the previous model, or of the prior
+///     s d = value / (u^2 s),  s^2 = 1/u^2 - 1/u_prior^2   of the data of the run
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "abbe/calib/offset_in_model.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
 namespace abbe::calib {
@@ -55,11 +63,26 @@ struct UpdateOptions {
   std::array<double, 3> u_axis_scale{};
 };
 
+/// A model, and the range offset that its covariance contains.
+struct ModelWithOffset {
+  VolumetricModel model;
+  std::optional<OffsetInModel> range_offset{};
+};
+
 /// Chain, nodes, gauge and tool offsets are those of `run`. The validity volume is that of
 /// `previous`, and that of `run` if a table is renewed. Pure.
-/// NotApplicable as check_same_parameters(), if a model depends on the direction of travel, and if a
+/// NotApplicable as check_same_parameters(), if a model depends on the direction of travel, if a
 /// covariance is not larger than the part that is stated as common, or leaves a combination without
-/// uncertainty. BadInput for an option out of its range or an unknown table.
+/// uncertainty, and if the offset that the data of the run state differs from that of the previous
+/// model by more than 4 standard uncertainties: then it is not the same. BadInput for an option out of
+/// its range, an unknown table, or an offset of another number of parameters.
+///
+/// The offset of `previous` must be that of the place of `run`; nullopt: not known, its prior is
+/// used. The result has the offset if the run has one.
+[[nodiscard]] Result<ModelWithOffset> update_model(const ModelWithOffset& previous,
+                                                   const ModelWithOffset& run,
+                                                   const UpdateOptions& = {});
+/// The same without an offset in common.
 [[nodiscard]] Result<VolumetricModel> update_model(const VolumetricModel& previous,
                                                    const VolumetricModel& run,
                                                    const UpdateOptions& = {});

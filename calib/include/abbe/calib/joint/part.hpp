@@ -27,6 +27,7 @@
 #include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/evemu/observe.hpp"
 #include "abbe/calib/mfb/observe.hpp"
+#include "abbe/calib/offset_in_model.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
@@ -72,8 +73,8 @@ struct Part {
 /// its prior. The part then states what its data alone know about the offset, and the prior is
 /// counted once for all runs.
 struct SharedRangeOffset {
-  std::string name;             ///< runs with the same name have the same offset
-  otf::OffsetInModel of_run{};  ///< Solution::offset_in_model
+  std::string name;        ///< runs with the same name have the same offset
+  OffsetInModel of_run{};  ///< otf::Solution::offset_in_model
 };
 
 /// Standard uncertainties of errors that parts have in common. An error that is not stated here

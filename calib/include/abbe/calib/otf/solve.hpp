@@ -39,6 +39,7 @@
 #include <vector>
 
 #include "abbe/calib/estimation/datum.hpp"
+#include "abbe/calib/offset_in_model.hpp"
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/encoder_log.hpp"
 #include "abbe/calib/otf/observe.hpp"
@@ -120,16 +121,6 @@ struct RangeOffset {
   double u_m = 0.0;
 };
 
-/// The range offset as it is in the covariance of the model, for a joint identification in which
-/// several runs have the same offset (joint/part.hpp). With the offset d the model of the run is
-///     U - dU_dd (d - value)
-struct OffsetInModel {
-  Eigen::VectorXd dU_dd;  ///< of the parameters of the basis, m/m or rad/m
-  double value_m = 0.0;   ///< estimate with the prior
-  double u_m = 0.0;
-  double u_prior_m = 0.0;
-};
-
 /// What the scale readings contributed (along_rows.hpp).
 struct Synchronisation {
   ClockMap clock;
@@ -170,7 +161,8 @@ struct Solution {
   std::vector<Backlash> backlash{};                  ///< with Options::backlash
   std::optional<TrackerDrift> drift{};               ///< with Options::nests
   std::optional<Smoothness> smoothness{};            ///< with Options::smoothness
-  /// With Noise::u_range_offset_m; not with nests, where it is estimated beside the drift.
+  /// With Noise::u_range_offset_m, for runs that share the offset; not with nests, where it is
+  /// estimated beside the drift.
   std::optional<OffsetInModel> offset_in_model{};
   FitOfRows fit{};
 };

@@ -1,0 +1,19 @@
+#pragma once
+/// The range offset of a laser tracker as it is in the covariance of a model. Pure data.
+
+#include <Eigen/Core>
+
+namespace abbe::calib {
+
+/// Estimate of the range offset d together with the parameters U of a model in gauge G2, with the
+/// covariance C. Given d, the model and its covariance are
+///     U - dU_dd (d - value),   C - u^2 dU_dd dU_dd^T
+/// so that runs with one and the same offset can be combined (joint/part.hpp, model_update.hpp).
+struct OffsetInModel {
+  Eigen::VectorXd dU_dd;  ///< of the parameters, m/m or rad/m
+  double value_m = 0.0;   ///< estimate with the prior N(0, u_prior^2)
+  double u_m = 0.0;
+  double u_prior_m = 0.0;
+};
+
+}  // namespace abbe::calib

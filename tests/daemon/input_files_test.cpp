@@ -41,6 +41,32 @@ TEST_F(InputFiles, ReadTheCartesianTrackerForm) {
   EXPECT_EQ(tracker->points[1].p_tracker_m, calib::Vector3(-1.0, 0.0005, 0.01));
 }
 
+TEST_F(InputFiles, PlaceTheTrackerInTheFrameOfItsPoints) {
+  const std::string option = "--tracker-centre-mm X,Y,Z";
+  const auto points = [&](const std::string& columns) {
+    return *read_tracker_csv(write("t.csv", "time_s," + columns + "\n0,1000,2000,3000\n"));
+  };
+  auto unstated = points("x_mm,y_mm,z_mm");
+  const auto missing = place_tracker(unstated, std::nullopt, "t.csv", option);
+  ASSERT_FALSE(missing);
+  EXPECT_THAT(missing.error().text,
+              AllOf(HasSubstr("t.csv: the columns x_mm, y_mm, z_mm do not state their frame"),
+                    HasSubstr("tracker_x_mm"), HasSubstr(option)));
+  ASSERT_TRUE(place_tracker(unstated, calib::Vector3(0.5, 0.0, -1.0), "t.csv", option));
+  EXPECT_EQ(unstated.points[0].p_tracker_m, calib::Vector3(0.5, 2.0, 4.0));
+
+  auto stated = points("tracker_x_mm,tracker_y_mm,tracker_z_mm");
+  EXPECT_TRUE(place_tracker(stated, std::nullopt, "t.csv", option));
+  const auto twice = place_tracker(stated, calib::Vector3(0.5, 0.0, -1.0), "t.csv", option);
+  ASSERT_FALSE(twice);
+  EXPECT_THAT(twice.error().text, HasSubstr("leave out --tracker-centre-mm"));
+
+  auto near = points("x_mm,y_mm,z_mm");
+  const auto inside = place_tracker(near, calib::Vector3(1.0, 2.1, 3.0), "t.csv", option);
+  ASSERT_FALSE(inside);
+  EXPECT_THAT(inside.error().text, HasSubstr("a point is 100 mm from the tracker"));
+}
+
 TEST_F(InputFiles, ReadTheSphericalTrackerForm) {
   const auto tracker = read_tracker_csv(
       write("t.csv",

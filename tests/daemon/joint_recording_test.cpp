@@ -35,7 +35,7 @@ OtfRun recorded_run(const fs::path& file) {
 }
 
 std::string tracker_csv(const OtfRun& run) {
-  std::string text = "time_s,x_mm,y_mm,z_mm\n";
+  std::string text = "time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm\n";
   for (const RunPoint& p : run.points)
     text += fmt::format(
         "{:.9f},{:.17g},{:.17g},{:.17g}\n",

@@ -33,7 +33,7 @@ inline std::string made_path_csv(const calib::otf::Path& path) {
 }
 
 inline std::string made_tracker_csv(std::span<const calib::otf::TrackerObservation> samples) {
-  std::string text = "time_s,x_mm,y_mm,z_mm\n";
+  std::string text = "time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm\n";
   for (const auto& s : samples)
     text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g}\n", s.time_s, 1e3 * s.p_tracker_m.x(),
                         1e3 * s.p_tracker_m.y(), 1e3 * s.p_tracker_m.z());

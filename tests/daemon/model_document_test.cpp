@@ -312,6 +312,33 @@ TEST(ModelDocument, KeepsTheMisfit) {
               ElementsAre(HasSubstr("misfit.u_V_um: 4 values, expected 3")));
 }
 
+TEST(ModelDocument, KeepsThePlaceOfTheTracker) {
+  auto document = synthetic_document(3);
+  const auto without = model_hash(document);
+  const auto n = document.model.U().size();
+  document.tracker_place = {"hall 3, \"door\"",
+                            {.dU_dd = Eigen::VectorXd::LinSpaced(n, -1.0 / 3, 2.0),
+                             .value_m = -3e-6 / 7,
+                             .u_m = 1e-6 / 3,
+                             .u_prior_m = 6e-6}};
+  const auto text = to_json(document);
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().text;
+  ASSERT_TRUE(read->tracker_place);
+  EXPECT_EQ(read->tracker_place->name, "hall 3, \"door\"");
+  EXPECT_EQ(read->tracker_place->range_offset.dU_dd, document.tracker_place->range_offset.dU_dd);
+  EXPECT_EQ(to_json(*read), text);
+  EXPECT_NE(model_hash(document), without);
+
+  const auto refused =
+      parse_model(replaced(text, "\"derivatives\": [", "\"derivatives\": [1,"), "model.json");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              ElementsAre(HasSubstr(fmt::format("tracker_place.derivatives: {} values for {} "
+                                                "parameters",
+                                                n + 1, n))));
+}
+
 TEST(ModelDocument, ReportsEveryFaultAtOnce) {
   auto text = to_json(synthetic_document(8));
   text = replaced(text, "\"gauge\": \"G1\"", "\"gauge\": \"G7\"");

@@ -114,10 +114,75 @@ TEST(DriftFindings, TheUpdateNamesWhatItRenewed) {
   const auto options = update_options(otf, finding, 2.0, {.continuous = true});
   EXPECT_THAT(options.renewed, ElementsAre("EC0Y"));
   const auto updated =
-      updated_model(run, accepted_verdict(), active, *finding.test, options, GateConfig{});
+      updated_model({run}, accepted_verdict(), {active}, *finding.test, options, GateConfig{});
   ASSERT_TRUE(updated) << updated.error().text;
   EXPECT_THAT(updated->verdict.notes.back(), HasSubstr("2 days old"));
   EXPECT_THAT(updated->verdict.notes.back(), HasSubstr("EC0Y of the run alone"));
+}
+
+TEST(OffsetInCommon, IsThatOfAYoungModelFromTheSamePlace) {
+  const std::optional run{calib::TrackerPlace{"door", {.value_m = 1e-6}}},
+      same{calib::TrackerPlace{"door", {.value_m = 2e-6}}},
+      other{calib::TrackerPlace{"window", {.value_m = 3e-6}}};
+  const DriftConfig config{.place_days = 30.0};
+  const auto common = offset_in_common(run, same, 29.0, config);
+  ASSERT_TRUE(common.of_active);
+  EXPECT_EQ(common.of_active->value_m, 2e-6);
+  EXPECT_EQ(common.note, "");
+
+  const auto note = [&](const std::optional<calib::TrackerPlace>& active, double days) {
+    const auto found = offset_in_common(run, active, days, config);
+    EXPECT_FALSE(found.of_active);
+    return found.note;
+  };
+  EXPECT_THAT(note(same, 31.0), HasSubstr("31 days old, more than [drift] place_days = 30"));
+  EXPECT_THAT(note(other, 1.0), HasSubstr("the active model is of the place \"window\""));
+  EXPECT_THAT(note({}, 1.0), HasSubstr("names no place of the tracker"));
+  EXPECT_FALSE(offset_in_common({}, same, 1.0, config).of_active);
+  EXPECT_EQ(offset_in_common({}, same, 1.0, config).note, "");
+}
+
+/// Two runs with one offset: that of the update is known better than that of either.
+TEST(OffsetInCommon, IsKeptByTheUpdate) {
+  const auto model = test::synthetic_model(1);
+  const calib::OffsetInModel offset{.dU_dd = Eigen::VectorXd::Zero(model.U().size()),
+                                    .value_m = 1e-6,
+                                    .u_m = 2e-6,
+                                    .u_prior_m = 6e-6};
+  const auto finding = find_drift(model, accepted_verdict(), model, {});
+  const auto updated = updated_model({model, offset}, accepted_verdict(), {model, offset},
+                                     *finding.test, {}, GateConfig{});
+  ASSERT_TRUE(updated) << updated.error().text;
+  ASSERT_TRUE(updated->model.range_offset);
+  EXPECT_LT(updated->model.range_offset->u_m, 1.5e-6);
+
+  auto moved = offset;
+  moved.value_m = -20e-6;
+  const auto refused = updated_model({model, moved}, accepted_verdict(), {model, offset},
+                                     *finding.test, {}, GateConfig{});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("give the place a new name"));
+}
+
+TEST(DriftConfiguration, NamesThePlaceOfTheTracker) {
+  const auto machine = [](const std::string& keys) {
+    return parse_config(test::synthetic_machine_toml() + "place = \"door\"\n" + keys,
+                        "machine.toml");
+  };
+  const auto config = machine("[drift]\nplace_days = 7\n");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->machine.tracker_place, "door");
+  EXPECT_EQ(config->drift.place_days, 7.0);
+  EXPECT_EQ(parse_config(test::synthetic_machine_toml(), "machine.toml")->drift.place_days, 30.0);
+
+  const auto no_offset = machine("u_range_offset_um = 0\n");
+  ASSERT_FALSE(no_offset);
+  EXPECT_THAT(no_offset.error().details, ElementsAre(HasSubstr("needs u_range_offset_um > 0")));
+  const auto nests = machine(
+      "nest = [{ name = \"A\", position_mm = [1500, -900, 200] }, { name = \"B\", "
+      "position_mm = [1800, 950, 150] }]\n");
+  ASSERT_FALSE(nests);
+  EXPECT_THAT(nests.error().details, ElementsAre(HasSubstr("needs no [[tracker.nest]]")));
 }
 
 TEST(DriftConfiguration, HasNoiseForSingleTables) {

@@ -88,6 +88,7 @@ TEST_F(TableRecognition, NamesOnlyTheMissingHeaderIfSpacesFollowTheCommas) {
 TEST_F(TableRecognition, NamesTheHeadersOfAsManyColumns) {
   EXPECT_THAT(tracker_faults("0,2000,0.1,0.2\n"),
               ElementsAre(HasSubstr("before this one: time_s,range_mm,azimuth_rad,elevation_rad"
+                                    "  or  time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm"
                                     "  or  time_s,x_mm,y_mm,z_mm")));
 }
 

@@ -34,7 +34,7 @@ std::string tracker_csv_of(std::size_t run) {
   const Eigen::Matrix3d R =
       Eigen::AngleAxisd(turn, Eigen::Vector3d(0.02, -0.03, 1).normalized()).matrix();
   const Eigen::Vector3d tracker_m(-0.9, -0.7 + 0.2 * static_cast<double>(run), -0.3);
-  std::string text = "time_s,x_mm,y_mm,z_mm\n";
+  std::string text = "time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm\n";
   for (const auto& point : test::synthetic_points()) {
     const Eigen::Vector3d p_mm =
         1e3 * (R.transpose() * (sim::position_m(truth, point.q_m) - tracker_m));

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 
 #include "abbe/base/json_text.hpp"
@@ -11,6 +13,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/other_beams.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/capabilities.hpp"
@@ -30,6 +33,7 @@
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 #include "tracker_drift_lines.hpp"
+#include "vector_option.hpp"
 
 namespace abbe::daemon {
 
@@ -55,6 +59,37 @@ std::string_view words(otf::Stage stage) {
       return "judging";
   }
   return "";
+}
+
+void judge_beams(const TrackerFile& points, const otf::Observations& observations,
+                 const otf::Solution& solution, calib::Verdict& verdict) {
+  if (points.frame == TrackerFile::Frame::Spherical) return;
+  const auto other = otf::find_other_beams(observations, solution);
+  if (!other) return;
+  const calib::Vector3 at_mm = points.centre_m * kMmPerM;
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  verdict.refuse(
+      "beams",
+      fmt::format(
+          "the noise of the points is smallest along ({:.2f}, {:.2f}, {:.2f}) of their frame "
+          "({:.2f} um, across {:.2f} um), {:.0f} degrees from beams from ({:.0f}, {:.0f}, "
+          "{:.0f}) mm, where the tracker is stated to stand: state where it stands in this "
+          "frame with --tracker-centre-mm",
+          other->direction.x(), other->direction.y(), other->direction.z(),
+          other->along_m * kUmPerM, other->across_m * kUmPerM, other->angle_rad * kDegrees,
+          at_mm.x(), at_mm.y(), at_mm.z()));
+}
+
+Result<void> apply_frame(const TrackerFile& points, const std::string& file,
+                         otf::Options& options) {
+  if (points.frame != TrackerFile::Frame::Parallel) return {};
+  options.orientation.up.reset();
+  if (options.nests.nests.empty()) return {};
+  return fail(
+      ErrorCode::BadInput,
+      fmt::format("{}: the positions of [[tracker.nest]] are in the frame of the tracker, and "
+                  "the points are not",
+                  file));
 }
 
 OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
@@ -90,6 +125,10 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar
   auto tracker = read_tracker_csv(
       arguments.tracker, [&](double fraction) { bar.show("reading the tracker", fraction); });
   if (!tracker) return tl::make_unexpected(tracker.error());
+  if (const auto placed = place_tracker(*tracker, arguments.tracker_centre_m(0), arguments.tracker,
+                                        arguments.centre_option);
+      !placed)
+    return tl::make_unexpected(placed.error());
   if (const auto valid = check_time_unit(arguments.tracker, *tracker, *path); !valid)
     return tl::make_unexpected(valid.error());
   std::vector<InputFile> sources{
@@ -144,6 +183,8 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
   otf::Options options = otf_options(files->tracker.points, files->config);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (files->encoder) options.orientation.scales_agree = true;
+  if (const auto valid = apply_frame(files->tracker, arguments.tracker, options); !valid)
+    return tl::make_unexpected(valid.error());
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
 
@@ -168,6 +209,7 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
       otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate),
                  options, otf::held_out_into(residuals));
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  judge_beams(files->tracker, found->observations, found->solution, *verdict);
   other.add_note(*verdict);
   if (files->encoder && *compared == 0)
     verdict->notes.emplace_back(
@@ -287,7 +329,25 @@ Result<OtfOutcome> identify(const IdentifyOtfArguments& arguments, ProgressBar& 
                                      : from_recording(arguments, *active, bar);
 }
 
-int run(const IdentifyOtfArguments& arguments) {
+/// Reads --tracker-centre-mm.
+Result<void> read_tracker_centres(IdentifyOtfArguments& arguments) {
+  for (const auto& text : arguments.tracker_centres) {
+    const auto centre_m = parse_mm("--tracker-centre-mm", text);
+    if (!centre_m) return tl::make_unexpected(centre_m.error());
+    arguments.tracker_centres_m.push_back(*centre_m);
+  }
+  const std::size_t files = std::max<std::size_t>(1, arguments.targets.size());
+  if (arguments.tracker_centres_m.size() <= 1 || arguments.tracker_centres_m.size() == files)
+    return {};
+  return fail(
+      ErrorCode::Usage,
+      fmt::format("--tracker-centre-mm is given {} times for {} files: give it once, or once "
+                  "for each --target",
+                  arguments.tracker_centres_m.size(), files));
+}
+
+int run(IdentifyOtfArguments& arguments) {
+  if (const auto valid = read_tracker_centres(arguments); !valid) return report(valid.error());
   ProgressBar bar;
   const auto outcome = identify(arguments, bar);
   bar.clear();
@@ -317,10 +377,19 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                                       "machine.toml or the daemon's abbed.toml");
   auto* path = command->add_option("--path", arguments->path,
                                    "path.csv: x_mm,y_mm,z_mm, the vertices of the driven path");
-  auto* tracker =
-      command->add_option("--tracker", arguments->tracker,
-                          "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
-                          "or time_s,x_mm,y_mm,z_mm[,status]");
+  auto* tracker = command->add_option(
+      "--tracker", arguments->tracker,
+      "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
+      "or time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm[,status], in the frame of "
+      "the tracker,\n"
+      "or time_s,x_mm,y_mm,z_mm[,status] in another frame, with "
+      "--tracker-centre-mm");
+  auto* centre = command->add_option(
+      "--tracker-centre-mm", arguments->tracker_centres,
+      "X,Y,Z: the tracker in the frame of points x_mm,y_mm,z_mm, such as machine or station\n"
+      "coordinates, to about 0.1 m: noise and offset of the ranges act along its beams; with "
+      "several\n--target, one for all or one for each");
+  centre->allow_extra_args(false);
   auto* encoder = command->add_option(
       "--encoder", arguments->encoder,
       "encoder.csv: time_s,x_mm,y_mm,z_mm, scale readings along the path with times of the\n"
@@ -349,6 +418,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       command->add_flag("--accept-path-orientation", arguments->accept_path_orientation,
                         "do not refuse the model because the path might be rotated by 180 degrees "
                         "(two signs\nreversed); as [gate] accept = [\"path-orientation\"]");
+  recording->excludes(centre);
   recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
   auto* targets = command->add_option(
       "--target", arguments->targets,

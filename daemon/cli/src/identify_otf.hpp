@@ -26,9 +26,18 @@ struct IdentifyOtfArguments {
   double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
-  std::vector<std::string> targets;  // X,Y,Z=FILE, one per run
+  std::vector<std::string> targets;          // X,Y,Z=FILE, one per run
+  std::vector<std::string> tracker_centres;  // X,Y,Z of --tracker-centre-mm
   // without a value: those of the configuration
   std::optional<calib::Vector3> target_offset_m{}, tracker_position_m{};
+  /// The tracker in the frame of points x_mm, y_mm, z_mm: of all files, or one per target.
+  std::vector<calib::Vector3> tracker_centres_m{};
+  std::string centre_option = "--tracker-centre-mm X,Y,Z";
+  /// Of the file of a target; of one run: 0.
+  [[nodiscard]] std::optional<calib::Vector3> tracker_centre_m(std::size_t file) const {
+    if (tracker_centres_m.empty()) return std::nullopt;
+    return tracker_centres_m.size() > 1 ? tracker_centres_m.at(file) : tracker_centres_m.front();
+  }
 };
 
 struct OtfOutcome {
@@ -54,6 +63,14 @@ struct OtfOutcome {
 [[nodiscard]] Result<void> apply_smoothness(const std::string& text, Config& config);
 /// The options of the command replace those of the configuration; --smoothness apart.
 void apply(const IdentifyOtfArguments& arguments, Config& config);
+
+/// Refuses the model of a run whose points state a place of the tracker that their noise contradicts.
+void judge_beams(const TrackerFile& points, const calib::otf::Observations& observations,
+                 const calib::otf::Solution& solution, calib::Verdict& verdict);
+/// What the frame of the points leaves of the options: the vertical of the tracker is unknown in another
+/// frame. Error for reference nests, whose positions are in the frame of the tracker.
+[[nodiscard]] Result<void> apply_frame(const TrackerFile& points, const std::string& file,
+                                       calib::otf::Options& options);
 
 /// Makes the checks of the path that the daemon makes before the machine drives. The message for a
 /// vertex outside the travel gives line and column.

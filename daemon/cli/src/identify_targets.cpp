@@ -77,6 +77,10 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, ProgressBar&
     if (!tracker) return tl::make_unexpected(tracker.error());
     if (const auto valid = check_time_unit(target->second, *tracker, all.path); !valid)
       return tl::make_unexpected(valid.error());
+    if (const auto placed = place_tracker(*tracker, arguments.tracker_centre_m(all.runs.size()),
+                                          target->second, arguments.centre_option);
+        !placed)
+      return tl::make_unexpected(placed.error());
     all.sources.push_back(tracker->source);
     all.runs.push_back({target->first, std::move(*tracker)});
   }
@@ -128,6 +132,10 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
   options.progress = [&](calib::otf::Stage stage, double fraction) {
     bar.show(words(stage), fraction);
   };
+  for (std::size_t k = 0; k < all->runs.size(); ++k)
+    if (const auto valid = apply_frame(all->runs[k].tracker, all->sources[k + 2].name, options);
+        !valid)
+      return tl::make_unexpected(valid.error());
   calib::otf::Noise noise = otf_noise(all->config.machine);
   noise.u_scale = u_scale_of(arguments, all->config);
 
@@ -143,6 +151,8 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
                                    gate_limits(all->config.gate), options,
                                    calib::otf::held_out_into(residuals));
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  for (std::size_t k = 0; k < all->runs.size(); ++k)
+    judge_beams(all->runs[k].tracker, found->observations[k], found->solutions[k], *verdict);
   other.add_note(*verdict);
   if (auto air = unmeasured_air_text(all->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));

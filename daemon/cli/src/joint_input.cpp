@@ -55,6 +55,8 @@ IdentifyOtfArguments arguments_of(const IdentifyJointArguments& all, const RunFi
   run.accept_path_orientation = all.accept_path_orientation;
   run.target_offset_m = files.target_offset_m;
   run.tracker_position_m = files.tracker_position_m;
+  if (files.tracker_centre_m) run.tracker_centres_m = {*files.tracker_centre_m};
+  run.centre_option = "tracker_centre_mm of the [[run]]";
   return run;
 }
 

@@ -23,6 +23,7 @@ void read_drift(ClassifiedSection& root, Config& out) {
   section.get("forgetting", drift.forgetting, kPlain, {0.01, 1.0});
   section.get("noise_um", drift.length_m_per_root_day, kMicro, kNotNegative);
   section.get("noise_urad", drift.angle_rad_per_root_day, kMicro, kNotNegative);
+  section.get("place_days", drift.place_days, kPlain, kPositive);
   if (drift.continuous && !drift.test)
     section.fault("continuous", "needs test = true: a table that drifted must not be averaged");
   if (drift.continuous && out.otf.backlash != calib::estimation::TravelDependence::None)

@@ -48,8 +48,27 @@ calib::UpdateOptions update_options(const CalibrationRun& run, const DriftFindin
   return options;
 }
 
-Result<UpdatedModel> updated_model(const calib::VolumetricModel& run, const calib::Verdict& verdict,
-                                   const calib::VolumetricModel& active,
+OffsetInCommon offset_in_common(const std::optional<calib::TrackerPlace>& run,
+                                const std::optional<calib::TrackerPlace>& active, double days,
+                                const DriftConfig& config) {
+  if (!run) return {};
+  const auto counts_as_new = [&](const std::string& why) {
+    return OffsetInCommon{
+        .note = fmt::format("the offset of the ranges at the place \"{}\" counts as a new one: {}",
+                            run->name, why)};
+  };
+  if (!active) return counts_as_new("the active model names no place of the tracker");
+  if (active->name != run->name)
+    return counts_as_new(fmt::format("the active model is of the place \"{}\"", active->name));
+  if (days > config.place_days)
+    return counts_as_new(
+        fmt::format("the active model is {:.3g} days old, more than [drift] place_days = {:g}",
+                    days, config.place_days));
+  return {.of_active = active->range_offset};
+}
+
+Result<UpdatedModel> updated_model(const calib::ModelWithOffset& run, const calib::Verdict& verdict,
+                                   const calib::ModelWithOffset& active,
                                    const calib::DriftTest& test,
                                    const calib::UpdateOptions& options, const GateConfig& gate) {
   if (test.rest.p < test.rest.limit)
@@ -62,7 +81,7 @@ Result<UpdatedModel> updated_model(const calib::VolumetricModel& run, const cali
 
   calib::HeldOutFigures figures = verdict.held_out;
   figures.active.reset();
-  calib::Verdict of_update = calib::decide(*model, figures, gate_limits(gate), &active);
+  calib::Verdict of_update = calib::decide(model->model, figures, gate_limits(gate), &active.model);
   of_update.held_out = verdict.held_out;
   of_update.notes.insert(of_update.notes.begin(), verdict.notes.begin(), verdict.notes.end());
   of_update.notes.push_back(

@@ -106,6 +106,17 @@ void add_misfit(Canonical& out, const calib::Misfit& misfit) {
   out.number(misfit.V_length_m);
 }
 
+/// Only if the tracker stood at a named place.
+void add_tracker_place(Canonical& out, const calib::TrackerPlace& place) {
+  out.text("tracker place");
+  out.text(place.name);
+  out.number(place.range_offset.value_m);
+  out.number(place.range_offset.u_m);
+  out.number(place.range_offset.u_prior_m);
+  out.count(static_cast<std::size_t>(place.range_offset.dU_dd.size()));
+  for (const double derivative : place.range_offset.dU_dd) out.number(derivative);
+}
+
 }  // namespace
 
 std::string model_hash(const ModelDocument& document) {
@@ -119,6 +130,7 @@ std::string model_hash(const ModelDocument& document) {
   if (document.artefact) add_artefact(out, *document.artefact);
   if (model.travel() != nullptr) add_travel(out, *model.travel());
   if (model.misfit() != nullptr) add_misfit(out, *model.misfit());
+  if (document.tracker_place) add_tracker_place(out, *document.tracker_place);
   return out.hex();
 }
 

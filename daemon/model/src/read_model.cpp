@@ -12,6 +12,7 @@
 #include "read_bar_figures.hpp"
 #include "read_misfit.hpp"
 #include "read_run_figures.hpp"
+#include "read_tracker_place.hpp"
 #include "read_travel.hpp"
 #include "verdict_json.hpp"
 
@@ -274,6 +275,7 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto travel = read_travel(in, description.parameters.size());
   if (travel) description.travel = travel->differences;
   description.misfit = read_misfit(in);
+  const auto tracker_place = read_tracker_place(in, description.parameters.size());
   const bool has_misfit = description.misfit.has_value();
   auto model = calib::VolumetricModel::from_description(std::move(description));
   if (!model && !in.any())
@@ -296,10 +298,11 @@ Result<ModelDocument> read_document(ModelReader& in) {
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
              hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  ModelDocument document{
-      std::move(*model), method, estimator, machine,       machine_hash, *created,
-      statistics,        inputs, artefact,  recording_gap, mode,         backlash,
-      tracker_drift,     bar,    run,       software,      verdict,      configuration};
+  ModelDocument document{std::move(*model), method,        estimator,    machine,
+                         machine_hash,      *created,      statistics,   inputs,
+                         artefact,          recording_gap, mode,         backlash,
+                         tracker_drift,     bar,           run,          software,
+                         verdict,           configuration, tracker_place};
   check_configuration(in, document);
   if (hash != model_hash(document))
     in.fault("hash", "is not the hash of the content: the file was changed or damaged");

@@ -303,6 +303,19 @@ void write_misfit(JsonText& out, const calib::Misfit& misfit) {
                   to_decimal(misfit.table_length_m, kMm), of_parameters));
 }
 
+void write_tracker_place(JsonText& out, const calib::TrackerPlace& place) {
+  std::string derivatives;
+  for (Eigen::Index i = 0; i < place.range_offset.dU_dd.size(); ++i)
+    derivatives.append(i > 0 ? "," : "").append(to_decimal(place.range_offset.dU_dd[i], 0));
+  out.key("tracker_place");
+  out.raw(
+      fmt::format("{{\"name\": {}, \"range_offset_um\": {}, \"u_um\": {}, \"u_prior_um\": {},\n"
+                  "    \"derivatives\": [{}]}}",
+                  JsonText::quoted(place.name), to_decimal(place.range_offset.value_m, kMicroUnit),
+                  to_decimal(place.range_offset.u_m, kMicroUnit),
+                  to_decimal(place.range_offset.u_prior_m, kMicroUnit), derivatives));
+}
+
 void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {
   out.key("tracker_drift");
   out.raw(fmt::format("{{\"largest_um\": {}, \"nest_repeatability_um\": {}, \"visits\": {}}}",
@@ -393,6 +406,7 @@ std::string to_json(const ModelDocument& document) {
   if (!document.backlash.empty()) write_backlash(out, document.backlash);
   if (model.travel() != nullptr) write_travel(out, model);
   if (model.misfit() != nullptr) write_misfit(out, *model.misfit());
+  if (document.tracker_place) write_tracker_place(out, *document.tracker_place);
   write_covariance(out, model.covariance());
 
   return out.finish();

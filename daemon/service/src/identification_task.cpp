@@ -61,14 +61,16 @@ void keep_verdict(ModelDocument& document, const calib::Verdict& verdict) {
 /// previous model, are the last inputs, with the hashes of their content. Statistics and residuals
 /// stay those of the run, and RunFigures::of_model names its model; the backlash is that of the
 /// update.
-ModelDocument updated_document(calib::VolumetricModel model, const ModelDocument& run,
+ModelDocument updated_document(calib::ModelWithOffset model, const ModelDocument& run,
                                const PublishedModel& previous) {
   ModelDocument document = run;
-  document.model = std::move(model);
+  document.model = std::move(model.model);
+  if (model.range_offset) document.tracker_place->range_offset = *std::move(model.range_offset);
   document.estimator += ", update";
   ModelDocument parent = run;
   parent.model = previous.model;
   parent.method = previous.method;
+  parent.tracker_place = previous.tracker_place;
   document.inputs.push_back({fmt::format("run, model {}", model_id(run)), model_hash(run)});
   document.inputs.push_back({fmt::format("previous model {}", previous.id), model_hash(parent)});
   document.backlash = determined_backlash(document.model);
@@ -135,8 +137,13 @@ void IdentificationTask::compare_with_active(JudgedModel& model, const Calibrati
   const std::chrono::duration<double, std::ratio<86400>> since =
       model.document.created - active->created;
   const auto options = update_options(run, finding, std::max(0.0, since.count()), drift);
-  auto updated = updated_model(model.document.model, model.verdict, active->model, *finding.test,
-                               options, config->gate);
+  const auto& place = model.document.tracker_place;
+  auto common = offset_in_common(place, active->tracker_place, options.days, drift);
+  if (!common.note.empty()) notes.push_back(std::move(common.note));
+  calib::ModelWithOffset of_run{model.document.model};
+  if (place) of_run.range_offset = place->range_offset;
+  auto updated = updated_model(of_run, model.verdict, {active->model, std::move(common.of_active)},
+                               *finding.test, options, config->gate);
   if (!updated) {
     notes.push_back(fmt::format("the active model was not updated: {}", updated.error().text));
     return;

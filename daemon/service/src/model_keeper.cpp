@@ -141,6 +141,7 @@ ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument d
       .hash = model_hash(document),
       .largest_U_m = largest_U_m(document.model),
       .simulated = made_on_simulated_devices(document).value_or(false),
+      .tracker_place = std::move(document.tracker_place),
       .model = std::move(document.model)});
   auto publication = encode_model(*model, machine_);
 

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "abbe/base/parsed_table.hpp"
@@ -58,7 +60,8 @@ void check_path(ParsedTable& parsed) {
   }
 }
 
-constexpr std::size_t kSpherical = 0;  // index of this variant of the file format
+// Variants of the file format.
+constexpr std::size_t kSpherical = 0, kTrackerFrame = 1, kUnstatedFrame = 2;
 
 void check_spherical(ParsedTable& parsed) {
   const auto& table = parsed.table;
@@ -137,6 +140,7 @@ Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
   auto parsed = parse_table(
       file,
       {{{"time_s"}, {"range_mm"}, {"azimuth_rad"}, {"elevation_rad"}, {"status", false}},
+       {{"time_s"}, {"tracker_x_mm"}, {"tracker_y_mm"}, {"tracker_z_mm"}, {"status", false}},
        {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
       progress);
   if (!parsed) return tl::make_unexpected(parsed.error());
@@ -145,11 +149,60 @@ Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
   check_spherical(*parsed);
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   TrackerFile tracker{parsed->source, {}, times_of(parsed->table)};
+  if (parsed->table.form() == kTrackerFrame) tracker.frame = TrackerFile::Frame::Tracker;
+  if (parsed->table.form() == kUnstatedFrame) tracker.frame = TrackerFile::Frame::Unstated;
   tracker.points.reserve(parsed->table.rows());
   for (std::size_t row = 0; row < parsed->table.rows(); ++row)
     tracker.points.push_back(observation(parsed->table, row));
 
   return tracker;
+}
+
+namespace {
+
+/// A tracker measures no reflector that is nearer.
+Result<void> check_distances(const TrackerFile& points, const std::filesystem::path& file,
+                             std::string_view where) {
+  constexpr double kNearest_m = 0.2;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const auto& point : points.points)
+    if (point.valid) nearest_m = std::min(nearest_m, point.p_tracker_m.norm());
+  if (nearest_m >= kNearest_m) return {};
+  return fail(
+      ErrorCode::BadInput,
+      fmt::format("{}: a point is {:.0f} mm from the tracker, {}: nearer than {:.0f} mm. The "
+                  "points are in another frame, as of the machine or a station",
+                  file.string(), nearest_m * kMmPerM, where, kNearest_m * kMmPerM));
+}
+
+}  // namespace
+
+Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vector3>& centre_m,
+                           const std::filesystem::path& file, std::string_view option) {
+  if (points.frame == TrackerFile::Frame::Spherical && !centre_m) return {};
+  if (points.frame != TrackerFile::Frame::Unstated) {
+    if (!centre_m)
+      return check_distances(points, file,
+                             "the origin of tracker_x_mm, tracker_y_mm, tracker_z_mm");
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: its points are in the frame of the tracker; leave out {}",
+                            file.string(), option));
+  }
+  if (!centre_m)
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format(
+            "{}: the columns x_mm, y_mm, z_mm do not state their frame, and noise and offset of "
+            "the "
+            "ranges act along the beams. Points in the frame of the tracker: name the columns "
+            "tracker_x_mm, tracker_y_mm, tracker_z_mm. Points exported in machine or station "
+            "coordinates: state with {} where the tracker stands in them",
+            file.string(), option));
+
+  for (auto& point : points.points) point.p_tracker_m -= *centre_m;
+  points.frame = TrackerFile::Frame::Parallel;
+  points.centre_m = *centre_m;
+  return check_distances(points, file, fmt::format("stated with {}", option));
 }
 
 Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,

@@ -39,6 +39,10 @@ RunFiles read_run(Section& part, std::size_t number, const std::filesystem::path
     part.fault("recording", "must not be given beside path, tracker or encoder: it contains them");
   read_vector(part, "target_offset_mm", run.target_offset_m);
   read_vector(part, "tracker_position_mm", run.tracker_position_m);
+  read_vector(part, "tracker_centre_mm", run.tracker_centre_m);
+  if (run.tracker_centre_m && !run.recording.empty())
+    part.fault("tracker_centre_mm",
+               "must not be given beside recording: its points are in the frame of the tracker");
   part.get("instrument", run.instrument);
   part.get("range_offset", run.range_offset);
   part.close();

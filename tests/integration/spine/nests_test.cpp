@@ -60,7 +60,7 @@ class NestRun : public Spine {
   void write_points_of_machine(const std::string& name) const {
     const auto recording = daemon::RecordingReader::open(recordings().front());
     ASSERT_TRUE(recording);
-    std::string text = "time_s,x_mm,y_mm,z_mm\n";
+    std::string text = "time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm\n";
     daemon::RecordingSink sink;
     sink.tracker_point = [&](const protocol::TrackerPoint& point, std::string_view) {
       const Eigen::Vector3d p_m = Eigen::Vector3d::Map(point.p_tracker_m.data());

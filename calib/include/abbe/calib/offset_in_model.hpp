@@ -2,6 +2,7 @@
 /// The range offset of a laser tracker as it is in the covariance of a model. Pure data.
 
 #include <Eigen/Core>
+#include <string>
 
 namespace abbe::calib {
 
@@ -14,6 +15,13 @@ struct OffsetInModel {
   double value_m = 0.0;   ///< estimate with the prior N(0, u_prior^2)
   double u_m = 0.0;
   double u_prior_m = 0.0;
+};
+
+/// The place of a tracker from which a model was measured, and the offset of its ranges, which other
+/// runs from there have in common with the model: same home position and reflector.
+struct TrackerPlace {
+  std::string name;
+  OffsetInModel range_offset;
 };
 
 }  // namespace abbe::calib

@@ -22,6 +22,18 @@ void read_noise(ClassifiedSection& tracker, MachineConfig& machine) {
   tracker.get(operation("u_range_offset_um"), machine.u_range_offset_m, kMicro, kNotNegative);
 }
 
+/// After the noise.
+void read_place(ClassifiedSection& tracker, MachineConfig& machine) {
+  constexpr std::size_t kLongest = 64;
+  tracker.get(operation("place"), machine.tracker_place);
+  if (machine.tracker_place.size() > kLongest)
+    tracker.fault("place", fmt::format("must be at most {} bytes long", kLongest));
+  if (!machine.tracker_place.empty() && machine.u_range_offset_m == 0.0)
+    tracker.fault("place",
+                  "needs u_range_offset_um > 0: runs from one place have the offset of the ranges "
+                  "in common");
+}
+
 void read_placement(ClassifiedSection& tracker, MachineConfig& machine) {
   TrackerVertical vertical = TrackerVertical::PlusZ;
   if (tracker.get_word<TrackerVertical>(operation("vertical"), vertical,
@@ -154,8 +166,13 @@ double default_u_scale(WeatherConfig weather, const toml::node* air) {
 void read_tracker(ClassifiedSection& root, Config& out, StreamNames& names) {
   ClassifiedSection tracker = root.child("tracker");
   read_noise(tracker, out.machine);
+  read_place(tracker, out.machine);
   read_placement(tracker, out.machine);
   read_nests(tracker, out.otf.nests);
+  if (!out.machine.tracker_place.empty() && !out.otf.nests.nests.empty())
+    tracker.fault("place",
+                  "needs no [[tracker.nest]]: with nests the offset of the ranges is "
+                  "estimated beside the drift, and is not kept");
   TrackerConfig config;
   const Role points = tracker.has("host") ? Role::Measurement : Role::Operation;
   const bool has_host = get_host(tracker, operation("host"), config.host);

@@ -142,6 +142,8 @@ ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mod
   std::copy_if(solution.backlash.begin(), solution.backlash.end(),
                std::back_inserter(document.backlash), [](const auto& b) { return b.determined; });
   if (solution.drift) document.tracker_drift = drift_figures(*solution.drift);
+  if (!config.machine.tracker_place.empty() && solution.offset_in_model)
+    document.tracker_place = {config.machine.tracker_place, *solution.offset_in_model};
   return document;
 }
 

@@ -62,6 +62,9 @@ struct MachineConfig {
   /// Standard uncertainty of the offset common to all ranges. From a limit of error of 10 um for
   /// home position and reflector: 10 um / sqrt(3).
   double u_range_offset_m = 6e-6;
+  /// Where the tracker stands. Runs with the same name have the same offset of the ranges: same home
+  /// position and reflector. Empty: every run has its own.
+  std::string tracker_place{};
   std::optional<TrackerVertical> tracker_vertical;          ///< nullopt: not levelled
   std::optional<std::array<double, 3>> tracker_position_m;  ///< machine axes, to 0.5 m
   [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
@@ -233,6 +236,9 @@ struct DriftConfig {
   /// Process noise of every table: standard deviation of its change in a day.
   double length_m_per_root_day = 0.5e-6;
   double angle_rad_per_root_day = 1e-6;
+  /// The offset of the ranges of a named place of the tracker counts as a new one after this time
+  /// without an update from there.
+  double place_days = 30.0;
   std::map<std::string, double> of_tables{};  ///< of single tables, m or rad per root of a day
 };
 

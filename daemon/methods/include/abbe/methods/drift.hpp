@@ -35,8 +35,18 @@ struct DriftFinding {
                                                   const DriftFinding& finding, double days,
                                                   const DriftConfig& config);
 
+/// The offset of the ranges that `active`, made `days` ago, has in common with a run from the place
+/// `run`: of the same name, and not older than [drift] place_days.
+struct OffsetInCommon {
+  std::optional<calib::OffsetInModel> of_active{};
+  std::string note{};  ///< for the verdict: why the offset counts as a new one; empty: it does not
+};
+[[nodiscard]] OffsetInCommon offset_in_common(const std::optional<calib::TrackerPlace>& run,
+                                              const std::optional<calib::TrackerPlace>& active,
+                                              double days, const DriftConfig& config);
+
 struct UpdatedModel {
-  calib::VolumetricModel model;
+  calib::ModelWithOffset model;
   calib::Verdict verdict;  ///< held-out figures and notes of the run
 };
 
@@ -44,9 +54,9 @@ struct UpdatedModel {
 /// gate for size, slope, volume and scale; that it is better than the active model follows from the
 /// run itself, which agrees with it in all tables that are kept. Refused if tables that drifted do
 /// not explain the difference of both, else as calib::update_model().
-[[nodiscard]] Result<UpdatedModel> updated_model(const calib::VolumetricModel& run,
+[[nodiscard]] Result<UpdatedModel> updated_model(const calib::ModelWithOffset& run,
                                                  const calib::Verdict& verdict,
-                                                 const calib::VolumetricModel& active,
+                                                 const calib::ModelWithOffset& active,
                                                  const calib::DriftTest& test,
                                                  const calib::UpdateOptions& options,
                                                  const GateConfig& gate);

@@ -13,6 +13,7 @@
 
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/environment/thermal_expansion.hpp"
+#include "abbe/calib/offset_in_model.hpp"
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 #include "abbe/config/config.hpp"
@@ -117,6 +118,8 @@ struct ModelDocument {
   /// Of the configuration; machine_hash is the hash of its readings. nullopt: a file of an earlier
   /// version, whose machine_hash is a former_machine_hash(). Not in the hash of the model.
   std::optional<Meaning> configuration{};
+  /// Of method otf with [tracker] place, for [drift] continuous. In the hash, if present.
+  std::optional<calib::TrackerPlace> tracker_place{};
 };
 /// Whether the devices that gave the data of the model were simulated; nullopt: not known, as in
 /// files of earlier versions.
@@ -128,8 +131,8 @@ struct ModelDocument {
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 
 /// SHA-256 in hex over the content of the model: method, chain, basis, nodes, gauge, tools,
-/// parameters, covariance, validity, the corrected thermal expansion of the ball array, and the
-/// differences between the directions of travel. Dates, inputs and statistics are not included, so
+/// parameters, covariance, validity, the corrected thermal expansion of the ball array, the
+/// differences between the directions of travel, the misfit, and the place of the tracker. Dates, inputs and statistics are not included, so
 /// that the live model and its replay have equal hashes.
 [[nodiscard]] std::string model_hash(const ModelDocument& document);
 

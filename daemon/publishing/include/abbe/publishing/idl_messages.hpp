@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/calib/offset_in_model.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 #include "abbe/drivers/device.hpp"
 #include "abbe/pipeline/session_status.hpp"
@@ -29,6 +30,7 @@ struct PublishedModel {
   /// The largest U(V), k = 2, of calib::iso::volume_error(); nullopt: it cannot be computed.
   std::optional<double> largest_U_m = {};
   bool simulated = false;  ///< its data came from simulated devices
+  std::optional<calib::TrackerPlace> tracker_place = {};  ///< not published; for updates of the model
   calib::VolumetricModel model;
 };
 

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -45,14 +46,31 @@ struct TimesOfFile {
   std::size_t first_line = 0, last_line = 0;
 };
 
-/// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]` or
-/// `time_s,x_mm,y_mm,z_mm[,status]`. Status of the device: 0 valid, 1 speed warning (valid); a
-/// point with another status remains in the sequence but is not used.
+/// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]`,
+/// `time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm[,status]`, or `time_s,x_mm,y_mm,z_mm[,status]` in a
+/// frame that the file does not state: see place_tracker(). Status of the device: 0 valid, 1 speed
+/// warning (valid); a point with another status remains in the sequence but is not used.
 struct TrackerFile {
   InputFile source;
   std::vector<calib::otf::TrackerObservation> points;  ///< times: since the first point
   TimesOfFile times{};
+  enum class Frame {
+    Spherical,
+    Tracker,   ///< tracker_x_mm, tracker_y_mm, tracker_z_mm
+    Unstated,  ///< x_mm, y_mm, z_mm
+    Parallel,  ///< the tracker is at the origin, its axes are those of another frame
+  };
+  Frame frame = Frame::Spherical;
+  calib::Vector3 centre_m = calib::Vector3::Zero();  ///< of the tracker, in the frame of the file
 };
+/// Moves the points of a file with x_mm, y_mm, z_mm so that the tracker, which is at `centre_m` of their
+/// frame, is at their origin: noise and offset of the ranges act along the beams. `option`: how
+/// `centre_m` is stated, for messages. BadInput if it is missing, or if a file in the frame of the tracker
+/// has one, or if a point would be nearer to the tracker than 0.2 m.
+[[nodiscard]] Result<void> place_tracker(TrackerFile& points,
+                                         const std::optional<calib::Vector3>& centre_m,
+                                         const std::filesystem::path& file,
+                                         std::string_view option);
 [[nodiscard]] Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
                                                    const ReadProgress& progress = {});
 

@@ -23,6 +23,8 @@ struct RunFiles {
   std::optional<calib::Vector3> target_offset_m{};
   /// Place of the tracker in machine coordinates, to 0.5 m; nullopt: that of the configuration.
   std::optional<calib::Vector3> tracker_position_m{};
+  /// The tracker in the frame of points x_mm, y_mm, z_mm (place_tracker()).
+  std::optional<calib::Vector3> tracker_centre_m{};
   /// Runs with the same instrument have the same error of the scale of its ranges.
   std::string instrument = "tracker";
   /// Runs with the same text have the same offset of the ranges; empty: its own.

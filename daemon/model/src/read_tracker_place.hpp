@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "abbe/calib/offset_in_model.hpp"
+#include "model_reader.hpp"
+
+namespace abbe::daemon {
+
+/// The member `tracker_place` of model.json, with one derivative for each of `parameters`; nullopt in
+/// models of runs without a named place, which those of earlier versions are.
+[[nodiscard]] std::optional<calib::TrackerPlace> read_tracker_place(ModelReader& in,
+                                                                    std::size_t parameters);
+
+}  // namespace abbe::daemon

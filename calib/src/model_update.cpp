@@ -111,11 +111,12 @@ Result<void> check_offsets(const ModelWithOffset& previous, const ModelWithOffse
       !(std::abs(now->value_m - before.value_m) < kSame * std::hypot(now->u_m, before.u_m))) {
     return failure(
         ErrorCode::NotApplicable,
-        message("update: the range offset of this place of the tracker was ",
-                kUmPerM * before.value_m, " um (u ", kUmPerM * before.u_m, " um), the run states ",
-                kUmPerM * now->value_m, " um (u ", kUmPerM * now->u_m,
-                " um): the tracker was moved, got a new home position or another reflector; give "
-                "the place a new name"));
+        message(
+            "update: the range offset of this place of the tracker was ", kUmPerM * before.value_m,
+            " um (u ", kUmPerM * before.u_m, " um), the run states ", kUmPerM * now->value_m,
+            " um (u ", kUmPerM * now->u_m,
+            " um). If the tracker was moved, got a new home position or another reflector, give "
+            "the place a new name"));
   }
   return {};
 }
@@ -261,15 +262,17 @@ Result<ModelWithOffset> update_model(const ModelWithOffset& before, const ModelW
   if (!added) {
     return tl::unexpected(added.error());
   }
+  update.add_offset(0.0, of_previous ? before.range_offset->u_prior_m : d_scale_m);
+  const auto add_data = [&](const OffsetInModel& offset, double factor) {
+    if (const std::optional<OffsetOfData> data = of_data(offset)) {
+      update.add_offset(data->value_m, data->u_m / std::sqrt(factor));
+    }
+  };
   if (of_previous) {
-    update.add_offset(before.range_offset->value_m, before.range_offset->u_m);
-  } else {
-    update.add_offset(0.0, d_scale_m);
+    add_data(*before.range_offset, options.forgetting);
   }
-  const std::optional<OffsetOfData> data =
-      of_run ? of_data(*now.range_offset) : std::optional<OffsetOfData>();
-  if (data) {
-    update.add_offset(data->value_m, data->u_m);
+  if (of_run) {
+    add_data(*now.range_offset, 1.0);
   }
 
   const auto [x, root] = update.solve();

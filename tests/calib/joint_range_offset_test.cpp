@@ -222,6 +222,26 @@ TEST(RangeOffsetOfUpdates, OfAnotherPlaceIsNotTheSame) {
   EXPECT_FALSE(without->range_offset);
 }
 
+/// Backlash adds unknowns that are no parameters of the model.
+TEST(RangeOffsetOfUpdates, HasOneDerivativeForEachParameterWithBacklash) {
+  MadeRun run = run_with_offset(30e-6, 1);
+  run.options.backlash = abbe::calib::estimation::TravelDependence::Backlash;
+  const otf::Solution solution = solution_of(run);
+  ASSERT_TRUE(solution.offset_in_model);
+  EXPECT_EQ(solution.offset_in_model->dU_dd.size(), solution.model.U().size());
+}
+
+/// Forgotten information lets the offset follow a slow change.
+TEST(RangeOffsetOfUpdates, IsForgottenAsTheTablesAre) {
+  const otf::Solution one = solution_of(run_with_offset(30e-6, 1)),
+                      two = solution_of(run_with_offset(30e-6, 2));
+  const auto all = update_model(with_offset(one), with_offset(two), {});
+  const auto half = update_model(with_offset(one), with_offset(two), {.forgetting = 0.5});
+  ASSERT_TRUE(all && half);
+  EXPECT_GT(half->range_offset->u_m, 1.1 * all->range_offset->u_m);
+  EXPECT_LE(half->range_offset->u_m, two.range_offset.u_m);
+}
+
 TEST(RangeOffsetOfUpdates, OfAnotherNumberOfParametersIsRefused) {
   const otf::Solution run = solution_of(run_with_offset(60e-6, 1));
   auto damaged = with_offset(run);

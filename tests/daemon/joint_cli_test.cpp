@@ -176,6 +176,20 @@ class JointCli : public ::testing::Test {
   static inline Ran agreed_;
 };
 
+TEST_F(JointCli, PointsInAnotherFrameNeedThePlaceOfTheTracker) {
+  std::string points = test::made_tracker_csv(made_.samples);
+  for (const std::string name : {"tracker_x_mm", "tracker_y_mm", "tracker_z_mm"})
+    points.replace(points.find(name), name.size(), name.substr(8));
+  write("unstated.csv", points);
+  std::string parts = kFrontRun + kBehindRun;
+  parts.replace(parts.find("front.csv"), 9, "unstated.csv");
+  expect_refused(identify(parts, "none"), 3, "tracker_centre_mm of the [[run]]");
+
+  const std::string recording = "[[run]]\nrecording = \"r.mcap\"\ntracker_centre_mm = [0, 0, 1]\n";
+  expect_refused(identify(recording + kBehindRun, "none"), 3,
+                 "its points are in the frame of the tracker");
+}
+
 TEST_F(JointCli, PartsThatAgreeGiveAModelThatIsNowhereLessCertain) {
   ASSERT_EQ(agreed_.exit, 0) << agreed_.out << agreed_.err;
   const auto summary = nlohmann::json::parse(agreed_.out);

@@ -2,6 +2,8 @@
 /// refusals before the first touch.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "abbe/config/config.hpp"
@@ -103,6 +105,94 @@ TEST_F(MfbSession, ReportsWhatToTouchFeatureByFeature) {
   EXPECT_EQ(a.next()->touched, 1u);
   EXPECT_EQ(a.points(), 9u);
   EXPECT_THAT(a.take_notes(), IsEmpty());
+}
+
+constexpr const char* kBarSensor = R"([[environment]]
+name = "rtd"
+map = "icpdas-zt2005-c8"
+host = "127.0.0.1"
+inputs = ["scale", "bar"]
+[mfb]
+bar_sensor = "bar"
+u_bar_K = 0.1
+)";
+
+TEST_F(MfbSession, TheSensorOnTheBarReplacesTheStatedTemperatureOfThePass) {
+  config = parsed(probed_machine(kBarSensor));
+  MfbAcquisition a = acquisition();
+  std::uint32_t number = 1;
+  const auto touch = [&](const Vector3& q_m, double t_K) {
+    auto s = bar_touch_at(q_m, number++);
+    s.has_environment = true;
+    s.environment.temperature_K[1] = t_K;
+    a.take(s);
+  };
+  const auto readings_m = planned_readings_m(3);
+  touch(readings_m[0], 294.0);
+  touch(readings_m[1], std::nan(""));
+  EXPECT_EQ(a.points(), 1u);
+  EXPECT_THAT(a.take_notes(),
+              ElementsAre(HasSubstr("the temperature \"bar\" of the bar was not known")));
+  touch(readings_m[1], 294.6);
+
+  const MfbRun run = a.release();
+  EXPECT_NEAR(run.plan.measurements[0].temperature_K.value(), 294.3, 1e-9);
+  EXPECT_NEAR(run.plan.noise.u_temperature_K, 0.3 / std::sqrt(3.0), 1e-9);
+  EXPECT_EQ(run.plan.noise.u_common_temperature_K, 0.1);
+  const auto stated =
+      parse_bar_plan_toml(test::reference_plan_toml(), "plan.toml",
+                          parse_bar_toml(test::reference_bar_toml(), "bar.toml")->bar);
+  EXPECT_EQ(run.plan.measurements[1].temperature_K, stated->plan.measurements[1].temperature_K);
+}
+
+TEST_F(MfbSession, OnlyTouchesOfThePassCountForTheTemperatureOfTheBar) {
+  config = parsed(probed_machine(kBarSensor));
+  const auto readings_m = planned_readings_m(4);
+  MfbAcquisition a = acquisition();
+  std::uint32_t number = 1;
+  const auto touch = [&](const Vector3& q_m, double t_K) {
+    auto s = bar_touch_at(q_m, number++);
+    s.has_environment = true;
+    s.environment.temperature_K[1] = t_K;
+    a.take(s);
+  };
+  // Of the first touch and one beside the bar neither may be right: both are discarded.
+  touch(readings_m[0], 400.0);
+  touch(readings_m[0] + Vector3(0.05, 0.05, 0.05), 400.0);
+  EXPECT_EQ(a.points(), 0u);
+  for (std::size_t k = 0; k < 3; ++k) touch(readings_m[k], 294.0);
+  touch(readings_m[3] + Vector3(0.05, 0.05, 0.05), 500.0);
+  touch(readings_m[2], 500.0);  // a second time
+  EXPECT_EQ(a.points(), 3u);
+  EXPECT_NEAR(a.release().plan.measurements[0].temperature_K.value(), 294.0, 1e-9);
+}
+
+/// Touches of an earlier session come without temperatures.
+TEST_F(MfbSession, APassOfAnEarlierSessionKeepsTheStatedTemperature) {
+  config = parsed(probed_machine(kBarSensor));
+  MfbRequest request = reference_request();
+  request.earlier_m = planned_readings_m(3);
+  MfbAcquisition a = acquisition(request);
+  const MfbRun run = a.release();
+  const auto stated =
+      parse_bar_plan_toml(test::reference_plan_toml(), "plan.toml",
+                          parse_bar_toml(test::reference_bar_toml(), "bar.toml")->bar);
+  EXPECT_EQ(run.plan.measurements[0].temperature_K, stated->plan.measurements[0].temperature_K);
+  EXPECT_EQ(run.plan.noise.u_common_temperature_K,
+            std::max(0.1, stated->plan.noise.common_temperature_K()));
+}
+
+TEST_F(MfbSession, TheSensorOnTheBarMustBeMeasuredAndHaveAnUncertainty) {
+  const auto faults = [](const std::string& table) {
+    const auto read = parse_config(probed_machine(table), "abbed.toml");
+    return read ? std::vector<std::string>{} : read.error().details;
+  };
+  EXPECT_THAT(faults("[mfb]\nbar_sensor = \"oven\"\nu_bar_K = 0.1\n"),
+              ElementsAre(HasSubstr("no [[environment]] measures a temperature \"oven\"")));
+  EXPECT_THAT(faults("[mfb]\nu_bar_K = 0.1\n"), ElementsAre(HasSubstr("needs bar_sensor")));
+  std::string without = kBarSensor;
+  without.erase(without.find("u_bar_K"));
+  EXPECT_THAT(faults(without), ElementsAre(HasSubstr("mfb.u_bar_K")));
 }
 
 TEST_F(MfbSession, ATouchThatTheProbeIsNotQualifiedForIsNamedAndNotUsed) {

@@ -138,8 +138,11 @@ TEST(OffsetInCommon, IsThatOfAYoungModelFromTheSamePlace) {
   EXPECT_THAT(note(same, 31.0), HasSubstr("31 days old, more than [drift] place_days = 30"));
   EXPECT_THAT(note(other, 1.0), HasSubstr("the active model is of the place \"window\""));
   EXPECT_THAT(note({}, 1.0), HasSubstr("names no place of the tracker"));
+  EXPECT_THAT(note(same, -1.0), HasSubstr("the clock was set back"));
   EXPECT_FALSE(offset_in_common({}, same, 1.0, config).of_active);
-  EXPECT_EQ(offset_in_common({}, same, 1.0, config).note, "");
+  EXPECT_THAT(offset_in_common({}, same, 1.0, config).note,
+              HasSubstr("the run names no place of the tracker"));
+  EXPECT_EQ(offset_in_common({}, {}, 1.0, config).note, "");
 }
 
 /// Two runs with one offset: that of the update is known better than that of either.

@@ -262,7 +262,7 @@ Eigen::MatrixXd RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) co
   }
 
   Eigen::MatrixXd variances = Eigen::MatrixXd::Zero(n, cells);
-  bool beyond_chance = log_p.minCoeff() < log_cell;
+  bool beyond_chance = (log_p.array() < log_cell).any();
   for (std::size_t c = 0; c < components_; ++c) {
     beyond_chance = beyond_chance || all.log_p(c) < log_all;
   }

@@ -147,10 +147,11 @@ WithRunEffects with_run_effects(const Observations& o, const WhitenedRows& rows,
     // Covariance of U and the offset, over the variance of the offset: with the other effects free.
     const Eigen::VectorXd dU_dd =
         e.root_cov_dU * e.root_cov_d.row(0).transpose() / (e.u(0) * e.u(0));
-    with.in_model = OffsetInModel{.dU_dd = dU_dd.head(static_cast<Eigen::Index>(o.basis.size())),
-                                  .value_m = with.offset.value_m,
-                                  .u_m = with.offset.u_m,
-                                  .u_prior_m = o.u_range_offset_m};
+    with.in_model =
+        OffsetInModel{.dU_dd = dU_dd.head(static_cast<Eigen::Index>(o.layout().model_size())),
+                      .value_m = with.offset.value_m,
+                      .u_m = with.offset.u_m,
+                      .u_prior_m = o.u_range_offset_m};
   }
   if (s_m > 0.0) {
     with.two_axes = two_axis_errors(e);

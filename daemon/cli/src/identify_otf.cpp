@@ -62,22 +62,28 @@ std::string_view words(otf::Stage stage) {
 }
 
 void judge_beams(const TrackerFile& points, const otf::Observations& observations,
-                 const otf::Solution& solution, calib::Verdict& verdict) {
+                 const otf::Solution& solution, const GateConfig& gate, calib::Verdict& verdict) {
   if (points.frame == TrackerFile::Frame::Spherical) return;
   const auto other = otf::find_other_beams(observations, solution);
   if (!other) return;
   const calib::Vector3 at_mm = points.centre_m * kMmPerM;
   constexpr double kDegrees = 180.0 / std::numbers::pi;
+  auto text = fmt::format(
+      "the noise of the points is smallest along ({:.2f}, {:.2f}, {:.2f}) of their frame "
+      "({:.2f} um, across {:.2f} um), {:.0f} degrees from beams from ({:.0f}, {:.0f}, {:.0f}) mm, "
+      "where the tracker is stated to stand",
+      other->direction.x(), other->direction.y(), other->direction.z(), other->along_m * kUmPerM,
+      other->across_m * kUmPerM, other->angle_rad * kDegrees, at_mm.x(), at_mm.y(), at_mm.z());
+  if (gate.accepts(otf::kOtherBeams)) {
+    verdict.notes.push_back(std::move(text));
+    return;
+  }
+  verdict.accepted = false;
   verdict.refuse(
-      "beams",
-      fmt::format(
-          "the noise of the points is smallest along ({:.2f}, {:.2f}, {:.2f}) of their frame "
-          "({:.2f} um, across {:.2f} um), {:.0f} degrees from beams from ({:.0f}, {:.0f}, "
-          "{:.0f}) mm, where the tracker is stated to stand: state where it stands in this "
-          "frame with --tracker-centre-mm",
-          other->direction.x(), other->direction.y(), other->direction.z(),
-          other->along_m * kUmPerM, other->across_m * kUmPerM, other->angle_rad * kDegrees,
-          at_mm.x(), at_mm.y(), at_mm.z()));
+      otf::kOtherBeams,
+      text + fmt::format(": state where it stands in this frame; if it does stand there and "
+                         "the machine vibrates so, [gate] accept = [\"{}\"]",
+                         otf::kOtherBeams));
 }
 
 Result<void> apply_frame(const TrackerFile& points, const std::string& file,
@@ -209,7 +215,7 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
       otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate),
                  options, otf::held_out_into(residuals));
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  judge_beams(files->tracker, found->observations, found->solution, *verdict);
+  judge_beams(files->tracker, found->observations, found->solution, files->config.gate, *verdict);
   other.add_note(*verdict);
   if (files->encoder && *compared == 0)
     verdict->notes.emplace_back(

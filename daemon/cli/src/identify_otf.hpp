@@ -64,11 +64,13 @@ struct OtfOutcome {
 /// The options of the command replace those of the configuration; --smoothness apart.
 void apply(const IdentifyOtfArguments& arguments, Config& config);
 
-/// Refuses the model of a run whose points state a place of the tracker that their noise contradicts.
+/// Refuses the model of a run whose points state a place of the tracker that their noise contradicts,
+/// unless the gate accepts it.
 void judge_beams(const TrackerFile& points, const calib::otf::Observations& observations,
-                 const calib::otf::Solution& solution, calib::Verdict& verdict);
-/// What the frame of the points leaves of the options: the vertical of the tracker is unknown in another
-/// frame. Error for reference nests, whose positions are in the frame of the tracker.
+                 const calib::otf::Solution& solution, const GateConfig& gate,
+                 calib::Verdict& verdict);
+/// What the frame of the points leaves of the options: the vertical of the tracker is unknown in
+/// another frame. Error for reference nests, whose positions are in the frame of the tracker.
 [[nodiscard]] Result<void> apply_frame(const TrackerFile& points, const std::string& file,
                                        calib::otf::Options& options);
 

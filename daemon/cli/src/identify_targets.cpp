@@ -23,6 +23,7 @@ namespace {
 struct TargetPoints {
   calib::Vector3 offset_m;
   TrackerFile tracker;
+  std::string file;
 };
 
 struct TargetRuns {
@@ -82,7 +83,7 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, ProgressBar&
         !placed)
       return tl::make_unexpected(placed.error());
     all.sources.push_back(tracker->source);
-    all.runs.push_back({target->first, std::move(*tracker)});
+    all.runs.push_back({target->first, std::move(*tracker), target->second});
   }
   return all;
 }
@@ -132,9 +133,8 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
   options.progress = [&](calib::otf::Stage stage, double fraction) {
     bar.show(words(stage), fraction);
   };
-  for (std::size_t k = 0; k < all->runs.size(); ++k)
-    if (const auto valid = apply_frame(all->runs[k].tracker, all->sources[k + 2].name, options);
-        !valid)
+  for (const TargetPoints& run : all->runs)
+    if (const auto valid = apply_frame(run.tracker, run.file, options); !valid)
       return tl::make_unexpected(valid.error());
   calib::otf::Noise noise = otf_noise(all->config.machine);
   noise.u_scale = u_scale_of(arguments, all->config);
@@ -152,7 +152,11 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
                                    calib::otf::held_out_into(residuals));
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   for (std::size_t k = 0; k < all->runs.size(); ++k)
-    judge_beams(all->runs[k].tracker, found->observations[k], found->solutions[k], *verdict);
+    judge_beams(all->runs[k].tracker, found->observations[k], found->solutions[k], all->config.gate,
+                *verdict);
+  if (!all->config.machine.tracker_place.empty())
+    verdict->notes.emplace_back(
+        "[tracker] place is not used: the offsets of the ranges of several targets are not kept");
   other.add_note(*verdict);
   if (auto air = unmeasured_air_text(all->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));

@@ -29,6 +29,7 @@ Config read_all(const Section& file, const std::filesystem::path& base) {
   read_otf(root, config.otf);
   read_drift(root, config);
   read_evemu(root, config);
+  read_mfb(root, config);
   read_control(root, base, config);
   // Checked only: abbe-web and abbe-mtconnect use them.
   (void)read_web(root.operation_table("web"), base);

@@ -5,6 +5,7 @@
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/calib/mfb/judge.hpp"
 #include "abbe/calib/otf/orientation.hpp"
+#include "abbe/calib/otf/other_beams.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -149,12 +150,13 @@ void read_gate(ClassifiedSection& root, Config& out) {
     for (const auto& name : gate.accept)
       if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume &&
           name != calib::kScaleChange && name != calib::otf::kPathOrientation &&
-          name != calib::mfb::kBarTemperature)
+          name != calib::mfb::kBarTemperature && name != calib::otf::kOtherBeams)
         section.fault(
             "accept",
-            fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\", \"{}\" or \"{}\"", name,
+            fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\", \"{}\", \"{}\" or \"{}\"", name,
                         calib::evemu::kShapeOnly, calib::kSmallerVolume, calib::kScaleChange,
-                        calib::otf::kPathOrientation, calib::mfb::kBarTemperature));
+                        calib::otf::kPathOrientation, calib::mfb::kBarTemperature,
+                        calib::otf::kOtherBeams));
   }
 
   section.close();

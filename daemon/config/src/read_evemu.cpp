@@ -30,6 +30,16 @@ void read_positions(Section& section, std::vector<int>& out) {
   for (const double position : given) out.push_back(static_cast<int>(position));
 }
 
+/// The sensor `name` of key `key`; 0 with a fault if no device measures it.
+std::uint8_t sensor_named(Section& section, std::string_view key, const std::string& name,
+                          const std::vector<std::string>& temperatures) {
+  const auto found = std::ranges::find(temperatures, name);
+  if (found != temperatures.end()) return static_cast<std::uint8_t>(found - temperatures.begin());
+  section.fault(key, fmt::format("no {} measures a temperature \"{}\"",
+                                 tables_with(Capability::Environment), name));
+  return 0;
+}
+
 void read_artefact_temperature(Section& section, const std::vector<std::string>& temperatures,
                                std::optional<ArtefactTemperatureConfig>& out) {
   ArtefactTemperatureConfig artefact;
@@ -41,13 +51,8 @@ void read_artefact_temperature(Section& section, const std::vector<std::string>&
   if (section.has("u_artefact_K") && !known)
     section.fault("u_artefact_K", "needs artefact_sensor or artefact_C");
 
-  if (section.get("artefact_sensor", sensor)) {
-    const auto found = std::ranges::find(temperatures, sensor);
-    if (found == temperatures.end())
-      section.fault("artefact_sensor", fmt::format("no {} measures a temperature \"{}\"",
-                                                   tables_with(Capability::Environment), sensor));
-    artefact.sensor = static_cast<std::uint8_t>(found - temperatures.begin());
-  }
+  if (section.get("artefact_sensor", sensor))
+    artefact.sensor = sensor_named(section, "artefact_sensor", sensor, temperatures);
 
   section.get("artefact_C", fixed_C, kPlain, {-50.0, 100.0});
   section.get("u_artefact_K", artefact.u_temperature_K, kPlain, {0.0, 50.0},
@@ -77,6 +82,21 @@ void read_evemu(ClassifiedSection& root, Config& out) {
                       static_cast<std::int64_t>(least.least_points_per_block), kMostPoints);
   section.get("longest_pause_s", evemu.longest_pause, kPlain, kPositive);
   read_artefact_temperature(section, out.temperatures, evemu.artefact);
+  section.close();
+}
+
+void read_mfb(ClassifiedSection& root, Config& out) {
+  Section section = root.operation_table("mfb");
+  ArtefactTemperatureConfig bar;
+  std::string sensor;
+  const bool known = section.get("bar_sensor", sensor);
+  if (known) bar.sensor = sensor_named(section, "bar_sensor", sensor, out.temperatures);
+  section.get("u_bar_K", bar.u_temperature_K, kPlain, {0.0, 50.0},
+              known ? Need::Required : Need::Optional);
+  if (known)
+    out.mfb.bar = bar;
+  else if (section.has("u_bar_K"))
+    section.fault("u_bar_K", "needs bar_sensor");
   section.close();
 }
 

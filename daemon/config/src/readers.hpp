@@ -31,6 +31,7 @@ void read_gate(ClassifiedSection& root, Config& out);
 void read_otf(ClassifiedSection& root, OtfConfig& out);
 void read_drift(ClassifiedSection& root, Config& out);
 void read_evemu(ClassifiedSection& root, Config& out);
+void read_mfb(ClassifiedSection& root, Config& out);
 void read_control(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 [[nodiscard]] WebConfig read_web(Section section, const std::filesystem::path& base);
 [[nodiscard]] MtconnectConfig read_mtconnect(Section section);

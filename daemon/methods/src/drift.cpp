@@ -51,6 +51,11 @@ calib::UpdateOptions update_options(const CalibrationRun& run, const DriftFindin
 OffsetInCommon offset_in_common(const std::optional<calib::TrackerPlace>& run,
                                 const std::optional<calib::TrackerPlace>& active, double days,
                                 const DriftConfig& config) {
+  if (!run && active)
+    return {.note =
+                fmt::format("the run names no place of the tracker: what is known of the offset "
+                            "of the ranges at the place \"{}\" is not used, and not kept",
+                            active->name)};
   if (!run) return {};
   const auto counts_as_new = [&](const std::string& why) {
     return OffsetInCommon{
@@ -60,6 +65,8 @@ OffsetInCommon offset_in_common(const std::optional<calib::TrackerPlace>& run,
   if (!active) return counts_as_new("the active model names no place of the tracker");
   if (active->name != run->name)
     return counts_as_new(fmt::format("the active model is of the place \"{}\"", active->name));
+  if (days < 0.0)
+    return counts_as_new("the active model has a later date than the run: the clock was set back");
   if (days > config.place_days)
     return counts_as_new(
         fmt::format("the active model is {:.3g} days old, more than [drift] place_days = {:g}",

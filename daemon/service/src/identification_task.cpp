@@ -6,6 +6,7 @@
 #include <chrono>
 #include <ratio>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "abbe/calib/otf/backlash.hpp"
@@ -67,12 +68,8 @@ ModelDocument updated_document(calib::ModelWithOffset model, const ModelDocument
   document.model = std::move(model.model);
   if (model.range_offset) document.tracker_place->range_offset = *std::move(model.range_offset);
   document.estimator += ", update";
-  ModelDocument parent = run;
-  parent.model = previous.model;
-  parent.method = previous.method;
-  parent.tracker_place = previous.tracker_place;
   document.inputs.push_back({fmt::format("run, model {}", model_id(run)), model_hash(run)});
-  document.inputs.push_back({fmt::format("previous model {}", previous.id), model_hash(parent)});
+  document.inputs.push_back({fmt::format("previous model {}", previous.id), previous.hash});
   document.backlash = determined_backlash(document.model);
   if (document.run) {
     document.run->of_model = model_id(run);
@@ -138,8 +135,13 @@ void IdentificationTask::compare_with_active(JudgedModel& model, const Calibrati
       model.document.created - active->created;
   const auto options = update_options(run, finding, std::max(0.0, since.count()), drift);
   const auto& place = model.document.tracker_place;
-  auto common = offset_in_common(place, active->tracker_place, options.days, drift);
+  auto common = offset_in_common(place, active->tracker_place, since.count(), drift);
   if (!common.note.empty()) notes.push_back(std::move(common.note));
+  if (const auto* otf = std::get_if<OtfRun>(&run);
+      otf != nullptr && !place && config->machine.u_range_offset_m > 0.0)
+    notes.emplace_back(
+        "the offset of the ranges counts as new information in every run: where the tracker stays "
+        "at its place, name it ([tracker] place)");
   calib::ModelWithOffset of_run{model.document.model};
   if (place) of_run.range_offset = place->range_offset;
   auto updated = updated_model(of_run, model.verdict, {active->model, std::move(common.of_active)},

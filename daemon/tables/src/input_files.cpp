@@ -162,17 +162,16 @@ namespace {
 
 /// A tracker measures no reflector that is nearer.
 Result<void> check_distances(const TrackerFile& points, const std::filesystem::path& file,
-                             std::string_view where) {
+                             std::string_view where, std::string_view advice) {
   constexpr double kNearest_m = 0.2;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (const auto& point : points.points)
     if (point.valid) nearest_m = std::min(nearest_m, point.p_tracker_m.norm());
   if (nearest_m >= kNearest_m) return {};
-  return fail(
-      ErrorCode::BadInput,
-      fmt::format("{}: a point is {:.0f} mm from the tracker, {}: nearer than {:.0f} mm. The "
-                  "points are in another frame, as of the machine or a station",
-                  file.string(), nearest_m * kMmPerM, where, kNearest_m * kMmPerM));
+  return fail(ErrorCode::BadInput,
+              fmt::format("{}: a point is {:.0f} mm from the tracker, {}, and no tracker measures "
+                          "nearer than {:.0f} mm. {}",
+                          file.string(), nearest_m * kMmPerM, where, kNearest_m * kMmPerM, advice));
 }
 
 }  // namespace
@@ -182,8 +181,9 @@ Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vecto
   if (points.frame == TrackerFile::Frame::Spherical && !centre_m) return {};
   if (points.frame != TrackerFile::Frame::Unstated) {
     if (!centre_m)
-      return check_distances(points, file,
-                             "the origin of tracker_x_mm, tracker_y_mm, tracker_z_mm");
+      return check_distances(points, file, "the origin of tracker_x_mm, tracker_y_mm, tracker_z_mm",
+                             "Points in another frame, as of the machine or a station, have the "
+                             "columns x_mm, y_mm, z_mm");
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: its points are in the frame of the tracker; leave out {}",
                             file.string(), option));
@@ -193,8 +193,7 @@ Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vecto
         ErrorCode::BadInput,
         fmt::format(
             "{}: the columns x_mm, y_mm, z_mm do not state their frame, and noise and offset of "
-            "the "
-            "ranges act along the beams. Points in the frame of the tracker: name the columns "
+            "the ranges act along the beams. Points in the frame of the tracker: name the columns "
             "tracker_x_mm, tracker_y_mm, tracker_z_mm. Points exported in machine or station "
             "coordinates: state with {} where the tracker stands in them",
             file.string(), option));
@@ -202,7 +201,8 @@ Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vecto
   for (auto& point : points.points) point.p_tracker_m -= *centre_m;
   points.frame = TrackerFile::Frame::Parallel;
   points.centre_m = *centre_m;
-  return check_distances(points, file, fmt::format("stated with {}", option));
+  return check_distances(points, file, fmt::format("stated with {}", option),
+                         "State its centre in the frame of the points");
 }
 
 Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,

@@ -25,8 +25,9 @@
 /// Runs from one place of a tracker have one range offset d. Where both models state it
 /// (OffsetInModel), d is an unknown beside e, with Cov given d, and its prior counts once:
 ///     W (e + N^T dU_dd d) = W N^T (U + dU_dd value)   for each model
-///     d / u = value / u                               of the previous model, or of the prior
-///     s d = value / (u^2 s),  s^2 = 1/u^2 - 1/u_prior^2   of the data of the run
+///     d / u_prior = 0                                     of the prior
+///     s d = value / (u^2 s),  s^2 = 1/u^2 - 1/u_prior^2   of the data of each model
+/// with s^2 of the previous model times `forgetting`. The offset has no process noise.
 
 #include <array>
 #include <optional>
@@ -74,8 +75,8 @@ struct ModelWithOffset {
 /// NotApplicable as check_same_parameters(), if a model depends on the direction of travel, if a
 /// covariance is not larger than the part that is stated as common, or leaves a combination without
 /// uncertainty, and if the offset that the data of the run state differs from that of the previous
-/// model by more than 4 standard uncertainties: then it is not the same. BadInput for an option out of
-/// its range, an unknown table, or an offset of another number of parameters.
+/// model by more than 4 standard uncertainties: then it is not the same. BadInput for an option out
+/// of its range, an unknown table, or an offset of another number of parameters.
 ///
 /// The offset of `previous` must be that of the place of `run`; nullopt: not known, its prior is
 /// used. The result has the offset if the run has one.

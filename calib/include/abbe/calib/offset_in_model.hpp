@@ -17,8 +17,8 @@ struct OffsetInModel {
   double u_prior_m = 0.0;
 };
 
-/// The place of a tracker from which a model was measured, and the offset of its ranges, which other
-/// runs from there have in common with the model: same home position and reflector.
+/// The place of a tracker from which a model was measured, and the offset of its ranges, which
+/// other runs from there have in common with the model: same home position and reflector.
 struct TrackerPlace {
   std::string name;
   OffsetInModel range_offset;

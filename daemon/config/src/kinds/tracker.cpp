@@ -25,7 +25,7 @@ void read_noise(ClassifiedSection& tracker, MachineConfig& machine) {
 /// After the noise.
 void read_place(ClassifiedSection& tracker, MachineConfig& machine) {
   constexpr std::size_t kLongest = 64;
-  tracker.get(operation("place"), machine.tracker_place);
+  tracker.get_maybe_empty(operation("place"), machine.tracker_place);
   if (machine.tracker_place.size() > kLongest)
     tracker.fault("place", fmt::format("must be at most {} bytes long", kLongest));
   if (!machine.tracker_place.empty() && machine.u_range_offset_m == 0.0)

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "abbe/config/calib_error.hpp"
@@ -43,18 +47,18 @@ Result<MfbAcquisition> MfbAcquisition::create(const MfbRequest& request,
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", request.plan.name, guide.error().text));
   if (const auto taken = take_earlier(*guide, request.earlier_m); !taken)
     return tl::unexpected(taken.error());
-  return MfbAcquisition{std::move(bar->bar),
-                        {bar->source, plan->source},
-                        *std::move(guide),
-                        std::move(options.touches)};
+  return MfbAcquisition{
+      std::move(bar->bar), {bar->source, plan->source}, *std::move(guide), std::move(options)};
 }
 
 MfbAcquisition::MfbAcquisition(mfb::Bar bar, std::vector<InputFile> sources, mfb::TouchGuide guide,
-                               TouchRules rules)
+                               MfbAcquisitionOptions options)
     : bar_(std::move(bar)),
       sources_(std::move(sources)),
       guide_(std::move(guide)),
-      intake_(std::move(rules)),
+      temperature_K_(guide_.plan().measurements.size()),
+      options_(std::move(options)),
+      intake_(options_.touches),
       has_earlier_(guide_.taken() > 0) {
   follow_guide();
 }
@@ -80,13 +84,38 @@ void MfbAcquisition::take(const protocol::Snapshot& snapshot) {
   if (auto lost = intake_.lost_zero(snapshot); phase_ == Phase::Running && !lost.empty())
     return end(std::move(lost));
   if (const auto fault = touch_fault(snapshot); !fault.empty()) return refuse(snapshot, fault);
+  const auto temperature_K = temperature_at(snapshot);
+  if (!temperature_K)
+    return refuse(snapshot, fmt::format("the temperature \"{}\" of the bar was not known",
+                                        options_.bar_sensor));
 
   intake_.usable(snapshot);
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
-  const mfb::GuidedTouch taken = guide_.take(reading_m);
+  const mfb::GuidedTouch taken = take_at(reading_m, *temperature_K);
   for (const std::string& text : taken.notes) intake_.note(snapshot, text);
   if (taken.fate == mfb::TouchFate::Taken) phase_ = Phase::Running;
   follow_guide();
+}
+
+std::optional<double> MfbAcquisition::temperature_at(const protocol::Snapshot& touch) const {
+  if (!options_.bar) return 0.0;
+  const double t_K =
+      touch.has_environment ? touch.environment.temperature_K[*options_.bar->sensor] : std::nan("");
+  return std::isfinite(t_K) ? std::optional(t_K) : std::nullopt;
+}
+
+/// The temperature belongs to the pass that has the touch; a pass that is discarded loses its own.
+mfb::GuidedTouch MfbAcquisition::take_at(const calib::Vector3& reading_m, double temperature_K) {
+  std::vector<std::size_t> before;
+  for (const mfb::PassTouches& pass : guide_.passes()) before.push_back(pass.size());
+  mfb::GuidedTouch taken = guide_.take(reading_m);
+  for (std::size_t pass = 0; pass < before.size(); ++pass) {
+    const std::size_t now = guide_.passes()[pass].size();
+    if (now < before[pass]) temperature_K_[pass].clear();
+    if (options_.bar && now > 0 && now != before[pass] && taken.fate == mfb::TouchFate::Taken)
+      temperature_K_[pass].push_back(temperature_K);
+  }
+  return taken;
 }
 
 /// Phase and instruction after a touch.
@@ -132,8 +161,30 @@ std::vector<calib::Vector3> MfbAcquisition::readings_m() const {
   return all;
 }
 
+mfb::Plan MfbAcquisition::plan_as_measured() const {
+  mfb::Plan plan = guide_.plan();
+  if (!options_.bar) return plan;
+  double u_drift_K = 0.0, u_common_K = options_.bar->u_temperature_K;
+  for (std::size_t pass = 0; pass < plan.measurements.size(); ++pass) {
+    const auto& values_K = temperature_K_[pass];
+    if (values_K.empty()) {
+      if (!guide_.passes()[pass].empty())
+        u_common_K = std::max(u_common_K, plan.noise.common_temperature_K());
+      continue;
+    }
+    const auto [low, high] = std::ranges::minmax_element(values_K);
+    plan.measurements[pass].temperature_K = std::accumulate(values_K.begin(), values_K.end(), 0.0) /
+                                            static_cast<double>(values_K.size());
+    // A rectangular distribution over the range of the values ([GUM] 4.3.7).
+    u_drift_K = std::max(u_drift_K, (*high - *low) / (2.0 * std::numbers::sqrt3));
+  }
+  plan.noise.u_temperature_K = std::hypot(plan.noise.u_temperature_K, u_drift_K);
+  plan.noise.u_common_temperature_K = u_common_K;
+  return plan;
+}
+
 MfbRun MfbAcquisition::release() {
-  return {std::move(bar_), guide_.plan(), guide_.passes(), std::move(sources_),
+  return {std::move(bar_), plan_as_measured(), guide_.passes(), std::move(sources_),
           has_earlier_ ? std::nullopt : intake_.observed()};
 }
 

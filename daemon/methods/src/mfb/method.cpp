@@ -102,7 +102,11 @@ MethodNeeds MfbMethod::needs(const Config& config) {
 }
 
 MfbMethod::Options MfbMethod::options(const Config& config) {
-  return {.touches = touch_rules(config), .machine = mfb_machine(config.machine)};
+  Options options{.touches = touch_rules(config),
+                  .bar = config.mfb.bar,
+                  .machine = mfb_machine(config.machine)};
+  if (options.bar) options.bar_sensor = config.temperatures[*options.bar->sensor];
+  return options;
 }
 
 json MfbMethod::to_json(const Request& request) {

@@ -134,8 +134,8 @@ struct BarOptions {
 /// tables. With the tool t of the common tables and the rotations phi that they leave out
 ///     V(q, t + d) = V(q, t + d; common tables) + phi(q) x d
 /// holds exactly, so that phi is a nuisance of the part, one table each, without prior. Effects:
-/// errors of the calibration of the bar, of its expansion and of its thermometer. NotApplicable for observations on
-/// other axes or nodes; errors of the adjustment of the bar.
+/// errors of the calibration of the bar, of its expansion and of its thermometer. NotApplicable for
+/// observations on other axes or nodes; errors of the adjustment of the bar.
 [[nodiscard]] Result<Part> part_of_bar(std::string name, const mfb::Observations&,
                                        const CommonTables&, const BarOptions& = {});
 

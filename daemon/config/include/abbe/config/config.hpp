@@ -62,8 +62,8 @@ struct MachineConfig {
   /// Standard uncertainty of the offset common to all ranges. From a limit of error of 10 um for
   /// home position and reflector: 10 um / sqrt(3).
   double u_range_offset_m = 6e-6;
-  /// Where the tracker stands. Runs with the same name have the same offset of the ranges: same home
-  /// position and reflector. Empty: every run has its own.
+  /// Where the tracker stands. Runs with the same name have the same offset of the ranges: same
+  /// home position and reflector. Empty: every run has its own.
   std::string tracker_place{};
   std::optional<TrackerVertical> tracker_vertical;          ///< nullopt: not levelled
   std::optional<std::array<double, 3>> tracker_position_m;  ///< machine axes, to 0.5 m
@@ -242,7 +242,8 @@ struct DriftConfig {
   std::map<std::string, double> of_tables{};  ///< of single tables, m or rad per root of a day
 };
 
-/// [evemu] artefact_sensor or artefact_C: temperature of the ball array while it is touched.
+/// [evemu] artefact_sensor or artefact_C, [mfb] bar_sensor: temperature of an artefact while it is
+/// touched.
 struct ArtefactTemperatureConfig {
   std::optional<std::uint8_t> sensor;  ///< index into Config::temperatures
   double fixed_K = 293.15;             ///< without a sensor
@@ -262,6 +263,12 @@ struct EvemuConfig {
   /// The calibration fails if no touch arrives for longer than this.
   std::chrono::nanoseconds longest_pause{std::chrono::hours{1}};
   std::optional<ArtefactTemperatureConfig> artefact;  ///< nullopt: 20 C is assumed
+};
+
+/// [mfb]: calibration with a Multi-Feature Bar.
+struct MfbConfig {
+  /// Temperature of the bar during its passes; nullopt: plan.toml states it.
+  std::optional<ArtefactTemperatureConfig> bar{};
 };
 
 /// [control]. Root and the daemon's user may send every request; see control_roles.hpp.
@@ -293,6 +300,7 @@ struct Config {
   OtfConfig otf;
   DriftConfig drift;
   EvemuConfig evemu;
+  MfbConfig mfb{};
   ControlConfig control;
   /// Of the tables above, made while they were read.
   Meaning meaning;

@@ -39,7 +39,7 @@ struct DriftFinding {
 /// `run`: of the same name, and not older than [drift] place_days.
 struct OffsetInCommon {
   std::optional<calib::OffsetInModel> of_active{};
-  std::string note{};  ///< for the verdict: why the offset counts as a new one; empty: it does not
+  std::string note{};  ///< for the verdict: why it is not used; empty: it is, or there is none
 };
 [[nodiscard]] OffsetInCommon offset_in_common(const std::optional<calib::TrackerPlace>& run,
                                               const std::optional<calib::TrackerPlace>& active,

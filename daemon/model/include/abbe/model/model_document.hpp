@@ -132,8 +132,8 @@ struct ModelDocument {
 
 /// SHA-256 in hex over the content of the model: method, chain, basis, nodes, gauge, tools,
 /// parameters, covariance, validity, the corrected thermal expansion of the ball array, the
-/// differences between the directions of travel, the misfit, and the place of the tracker. Dates, inputs and statistics are not included, so
-/// that the live model and its replay have equal hashes.
+/// differences between the directions of travel, the misfit, and the place of the tracker. Dates,
+/// inputs and statistics are not included, so that the live model and its replay have equal hashes.
 [[nodiscard]] std::string model_hash(const ModelDocument& document);
 
 /// The id of a model in commands and in the store: 16 digits of a hash over model_hash() and the

@@ -29,8 +29,8 @@ struct PublishedModel {
   std::string hash = {};  ///< model_hash() of the document
   /// The largest U(V), k = 2, of calib::iso::volume_error(); nullopt: it cannot be computed.
   std::optional<double> largest_U_m = {};
-  bool simulated = false;  ///< its data came from simulated devices
-  std::optional<calib::TrackerPlace> tracker_place = {};  ///< not published; for updates of the model
+  bool simulated = false;                                 ///< its data came from simulated devices
+  std::optional<calib::TrackerPlace> tracker_place = {};  ///< not published; for updates
   calib::VolumetricModel model;
 };
 

@@ -47,8 +47,8 @@ struct TimesOfFile {
 };
 
 /// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]`,
-/// `time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm[,status]`, or `time_s,x_mm,y_mm,z_mm[,status]` in a
-/// frame that the file does not state: see place_tracker(). Status of the device: 0 valid, 1 speed
+/// `time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm[,status]`, or `time_s,x_mm,y_mm,z_mm[,status]` in
+/// a frame that the file does not state: see place_tracker(). Status of the device: 0 valid, 1 speed
 /// warning (valid); a point with another status remains in the sequence but is not used.
 struct TrackerFile {
   InputFile source;
@@ -63,10 +63,10 @@ struct TrackerFile {
   Frame frame = Frame::Spherical;
   calib::Vector3 centre_m = calib::Vector3::Zero();  ///< of the tracker, in the frame of the file
 };
-/// Moves the points of a file with x_mm, y_mm, z_mm so that the tracker, which is at `centre_m` of their
-/// frame, is at their origin: noise and offset of the ranges act along the beams. `option`: how
-/// `centre_m` is stated, for messages. BadInput if it is missing, or if a file in the frame of the tracker
-/// has one, or if a point would be nearer to the tracker than 0.2 m.
+/// Moves the points of a file with x_mm, y_mm, z_mm so that the tracker, which is at `centre_m` of
+/// their frame, is at their origin: noise and offset of the ranges act along the beams. `option`:
+/// how `centre_m` is stated, for messages. BadInput if it is missing, if a file in the frame of the
+/// tracker has one, or if a point would be nearer to the tracker than 0.2 m.
 [[nodiscard]] Result<void> place_tracker(TrackerFile& points,
                                          const std::optional<calib::Vector3>& centre_m,
                                          const std::filesystem::path& file,

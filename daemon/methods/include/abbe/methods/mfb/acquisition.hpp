@@ -14,6 +14,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/mfb/touch_guide.hpp"
+#include "abbe/config/config.hpp"
 #include "abbe/methods/touch_intake.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
 #include "abbe/pipeline/session_status.hpp"
@@ -46,6 +47,10 @@ struct MfbRun {
 
 struct MfbAcquisitionOptions {
   TouchRules touches{};
+  /// Sensor on the bar. A touch is not used if it has no valid value at its instant. nullopt:
+  /// plan.toml states the temperatures.
+  std::optional<ArtefactTemperatureConfig> bar{};
+  std::string bar_sensor{};  ///< name of the temperature
   /// Error: the configuration describes no machine that can be calibrated with a bar.
   Result<calib::mfb::MfbMachine> machine = fail(ErrorCode::Refused, "no machine is configured");
 };
@@ -76,11 +81,18 @@ class MfbAcquisition {
   [[nodiscard]] std::vector<std::string> take_notes() { return intake_.take_notes(); }
   /// Readings of all touches taken so far, in their order.
   [[nodiscard]] std::vector<calib::Vector3> readings_m() const;
+  /// With a sensor on the bar, the plan of the run has the mean temperature of each pass instead of
+  /// the stated one, with its uncertainty. A pass that only earlier sessions touched keeps the stated
+  /// one, and the uncertainty common to all passes is then the larger of both.
   [[nodiscard]] MfbRun release();
 
  private:
   MfbAcquisition(calib::mfb::Bar bar, std::vector<InputFile> sources, calib::mfb::TouchGuide guide,
-                 TouchRules rules);
+                 MfbAcquisitionOptions options);
+  /// The temperature of the bar at a touch; nullopt: no valid value. Without a sensor: 0.
+  [[nodiscard]] std::optional<double> temperature_at(const protocol::Snapshot& touch) const;
+  calib::mfb::GuidedTouch take_at(const calib::Vector3& reading_m, double temperature_K);
+  [[nodiscard]] calib::mfb::Plan plan_as_measured() const;
   void refuse(const protocol::Snapshot& touch, std::string_view fault);
   void end(std::string reason);
   void follow_guide();
@@ -88,6 +100,9 @@ class MfbAcquisition {
   calib::mfb::Bar bar_;
   std::vector<InputFile> sources_;
   calib::mfb::TouchGuide guide_;
+  /// Temperatures of the bar at the touches of each pass, without those of earlier sessions.
+  std::vector<std::vector<double>> temperature_K_;
+  MfbAcquisitionOptions options_;
   TouchIntake intake_;
   bool has_earlier_ = false;  // touches of earlier sessions
   Phase phase_ = Phase::WaitingAtStart;

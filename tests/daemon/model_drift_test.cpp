@@ -439,5 +439,30 @@ TEST_F(DriftingMachine, ARunUpdatesTheActiveModelAndNamesBothParents) {
   EXPECT_LT(document.model.parameters().back().u, store().load(first)->model.parameters().back().u);
 }
 
+/// The model of the last run from the place, also after a restart.
+TEST_F(DriftingMachine, RunsFromOnePlaceShareTheOffsetOfTheRanges) {
+  configure("place = \"door\"\n[drift]\ncontinuous = true\n");
+  std::vector<double> u_m;
+  for (int run = 0; run < 3; ++run) {
+    restart();
+    (void)calibrate();
+    ASSERT_EQ(status(), ModelStatus::MODEL_ACTIVE) << service_->status().reason;
+    const auto place = store().load(model().model->id)->tracker_place;
+    ASSERT_TRUE(place);
+    EXPECT_EQ(place->name, "door");
+    u_m.push_back(place->range_offset.u_m);
+  }
+  EXPECT_LT(u_m[1], u_m[0]);
+  EXPECT_LT(u_m[2], u_m[1]);
+
+  configure("place = \"window\"\n[drift]\ncontinuous = true\n");
+  restart();
+  (void)calibrate();
+  const auto document = store().load(model().model->id).value();
+  EXPECT_EQ(document.tracker_place->name, "window");
+  EXPECT_THAT(document.verdict->notes,
+              ::testing::Contains(HasSubstr("the active model is of the place \"door\"")));
+}
+
 }  // namespace
 }  // namespace abbe::daemon

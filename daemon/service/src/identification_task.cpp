@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abbe/calib/otf/backlash.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/drift.hpp"
 #include "abbe/service/calibration_service.hpp"
@@ -139,9 +140,10 @@ void IdentificationTask::compare_with_active(JudgedModel& model, const Calibrati
   if (!common.note.empty()) notes.push_back(std::move(common.note));
   if (const auto* otf = std::get_if<OtfRun>(&run);
       otf != nullptr && !place && config->machine.u_range_offset_m > 0.0)
-    notes.emplace_back(
-        "the offset of the ranges counts as new information in every run: where the tracker stays "
-        "at its place, name it ([tracker] place)");
+    notes.push_back(
+        fmt::format("the offset of the ranges counts as new information in every run: where the "
+                    "tracker stays at its place, name it ({} place)",
+                    tables_with(Capability::TrackerPoints)));
   calib::ModelWithOffset of_run{model.document.model};
   if (place) of_run.range_offset = place->range_offset;
   auto updated = updated_model(of_run, model.verdict, {active->model, std::move(common.of_active)},

@@ -118,7 +118,7 @@ struct ModelDocument {
   /// Of the configuration; machine_hash is the hash of its readings. nullopt: a file of an earlier
   /// version, whose machine_hash is a former_machine_hash(). Not in the hash of the model.
   std::optional<Meaning> configuration{};
-  /// Of method otf with [tracker] place, for [drift] continuous. In the hash, if present.
+  /// Of method otf with a named place of the tracker, for updates. In the hash, if present.
   std::optional<calib::TrackerPlace> tracker_place{};
 };
 /// Whether the devices that gave the data of the model were simulated; nullopt: not known, as in

@@ -117,15 +117,19 @@ bar_sensor = "bar"
 u_bar_K = 0.1
 )";
 
+protocol::Snapshot measured_touch_at(const Vector3& q_m, std::uint32_t number, double bar_K) {
+  auto s = bar_touch_at(q_m, number);
+  s.has_environment = true;
+  s.environment.temperature_K[1] = bar_K;
+  return s;
+}
+
 TEST_F(MfbSession, TheSensorOnTheBarReplacesTheStatedTemperatureOfThePass) {
   config = parsed(probed_machine(kBarSensor));
   MfbAcquisition a = acquisition();
   std::uint32_t number = 1;
   const auto touch = [&](const Vector3& q_m, double t_K) {
-    auto s = bar_touch_at(q_m, number++);
-    s.has_environment = true;
-    s.environment.temperature_K[1] = t_K;
-    a.take(s);
+    a.take(measured_touch_at(q_m, number++, t_K));
   };
   const auto readings_m = planned_readings_m(3);
   touch(readings_m[0], 294.0);
@@ -151,10 +155,7 @@ TEST_F(MfbSession, OnlyTouchesOfThePassCountForTheTemperatureOfTheBar) {
   MfbAcquisition a = acquisition();
   std::uint32_t number = 1;
   const auto touch = [&](const Vector3& q_m, double t_K) {
-    auto s = bar_touch_at(q_m, number++);
-    s.has_environment = true;
-    s.environment.temperature_K[1] = t_K;
-    a.take(s);
+    a.take(measured_touch_at(q_m, number++, t_K));
   };
   // Of the first touch and one beside the bar neither may be right: both are discarded.
   touch(readings_m[0], 400.0);

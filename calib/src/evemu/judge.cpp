@@ -15,8 +15,8 @@
 #include "check_stopped.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/slow_noise.hpp"
-#include "misfit_in_V.hpp"
 #include "message.hpp"
+#include "misfit_in_V.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::evemu {

@@ -347,9 +347,9 @@ Result<void> read_tracker_centres(IdentifyOtfArguments& arguments) {
     return {};
   return fail(
       ErrorCode::Usage,
-      fmt::format("--tracker-centre-mm is given {} times for {} files: give it once, or once "
-                  "for each --target",
-                  arguments.tracker_centres_m.size(), files));
+      fmt::format("--tracker-centre-mm is given {} times, --target {} times: give the centre once, "
+                  "or once for each --target",
+                  arguments.tracker_centres_m.size(), arguments.targets.size()));
 }
 
 int run(IdentifyOtfArguments& arguments) {
@@ -424,8 +424,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       command->add_flag("--accept-path-orientation", arguments->accept_path_orientation,
                         "do not refuse the model because the path might be rotated by 180 degrees "
                         "(two signs\nreversed); as [gate] accept = [\"path-orientation\"]");
-  recording->excludes(centre);
-  recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
+  recording->excludes(centre)->excludes(u_scale)->excludes(corrected)->excludes(orientation);
   auto* targets = command->add_option(
       "--target", arguments->targets,
       "instead of --tracker, three times or more: X,Y,Z=FILE, target offset in mm and tracker.csv "

@@ -156,9 +156,7 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
                 *verdict);
   if (!all->config.machine.tracker_place.empty())
     verdict->notes.emplace_back(
-        "the place of the tracker is not used: the offsets of the ranges of several targets are "
-        "not "
-        "kept");
+        "the place of the tracker is not used: of several targets no offset of the ranges is kept");
   other.add_note(*verdict);
   if (auto air = unmeasured_air_text(all->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));

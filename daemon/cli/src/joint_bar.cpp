@@ -62,7 +62,7 @@ void set_aside(std::vector<mfb::PassTouches>& passes,
       touch.set_aside = touch.set_aside || touch.target == wrong.target;
 }
 
-/// The verdict of `identify mfb` on the bar alone; the touches that it finds wrong are set aside. A bar
+/// The verdict of `identify mfb` on the bar alone; the touches that it finds wrong are excluded. A bar
 /// that determines no model by itself has no reasons, and a note.
 calib::Verdict verdict_of_bar(MfbTask& task, const Config& config) {
   const auto found = identify_with_bar(task, config, nullptr);

@@ -18,6 +18,7 @@ using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 Identification identified(unsigned seed, const Plan& plan = paper_plan(),
                           const ProbingOptions& options = {}) {
@@ -178,6 +179,25 @@ TEST(MfbJudge, AsksByNameForABarThatIsFarFrom20C) {
   }
   EXPECT_TRUE(judge(at(31.0), nullptr)->accepted);
   EXPECT_TRUE(judge(at(9.0), nullptr)->accepted);
+}
+
+// Far from 20 C the uncertain expansion leaves no scale determined; further positions do not help.
+TEST(MfbJudge, NamesTheTemperatureThatLeavesTheScalesUndetermined) {
+  Plan plan = paper_plan();
+  for (Measurement& m : plan.measurements) {
+    m.temperature_K = 273.15 + 68.9;
+  }
+  ProbingOptions options;
+  options.expansion = Expansivity{11.5e-6, 0.8e-6};
+  std::mt19937_64 random(9);
+  const SimulatedMachine machine(random);
+  const ProbedBar probed = probe(machine, plan, random, options);
+  const auto found = identify(probed.bar, plan, probed.touches, paper_machine());
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().text,
+              AllOf(HasSubstr("do not show EXX"), HasSubstr("the temperature of the bar is 68.9 C"),
+                    HasSubstr("check temperature_C, in degrees Celsius"),
+                    Not(HasSubstr("measure in further positions"))));
 }
 
 TEST(MfbJudge, StatesOnWhatTheScaleDepends) {

@@ -9,6 +9,7 @@
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 #include "abbe/sim/random_truth.hpp"
+#include "model_against_truth.hpp"
 #include "otf_reference.hpp"
 #include "random_numbers.hpp"
 
@@ -87,50 +88,14 @@ Vector3 of_squareness_at_reference(const sim::TruthMachine& truth) {
 }
 
 void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& model) {
-  constexpr int kSteps = 8;
   const Vector3 constant_m = of_squareness_at_reference(run.truth);
-  std::vector<Vector3> points, truth, difference;
-  std::vector<calib::Matrix3> cov;
-  const Vector3& t = run.truth.target_offset_m;
-
-  for (int i = 0; i <= kSteps; ++i) {
-    for (int j = 0; j <= kSteps; ++j) {
-      for (int k = 0; k <= kSteps; ++k) {
-        Vector3 q;
-        const std::array<int, 3> at{i, j, k};
-        for (const sim::Axis a : sim::kAxes) {
-          const auto n = static_cast<std::size_t>(a);
-          const auto& range = run.truth.axis(a).range;
-          q(static_cast<Eigen::Index>(n)) =
-              range.min_m + (range.max_m - range.min_m) * at[n] / kSteps;
-        }
-        const Vector3 V = true_error_m(run, q) - constant_m;
-        const calib::VolumetricError e = model.error_at(q, run.machine.target_offset_m);
-        points.push_back(q + t);
-        truth.push_back(V);
-        difference.push_back(e.V_m - V);
-        cov.push_back(e.cov_V_m2);
-      }
-    }
+  Vector3 low_m, high_m;
+  for (std::size_t k = 0; k < 3; ++k) {
+    low_m(static_cast<Eigen::Index>(k)) = run.truth.axes[k].range.min_m;
+    high_m(static_cast<Eigen::Index>(k)) = run.truth.axes[k].range.max_m;
   }
-
-  const auto before = calib::rigid_free(points, truth),
-             left = calib::rigid_free(points, difference);
-  outcome.before_m = before->rigid_free.mean_m;
-  outcome.left_m = left->rigid_free.mean_m;
-  // A component of V whose uncertainty is below kFixed_m is fixed by the gauge and has no interval.
-  constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;
-
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      const double u_m = std::sqrt(std::max(0.0, cov[i](k, k)));
-      if (u_m > kFixed_m) {
-        ++outcome.intervals;
-        outcome.covered += std::abs(difference[i](k)) <= kNormal975 * u_m;
-      }
-    }
-    outcome.u_m += std::sqrt(std::max(0.0, cov[i].trace())) / static_cast<double>(points.size());
-  }
+  compare_with_truth(outcome, model, {low_m, high_m}, run.truth.target_offset_m,
+                     [&](const Vector3& q) { return Vector3(true_error_m(run, q) - constant_m); });
 }
 
 /// At random places of the travels.

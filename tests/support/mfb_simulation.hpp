@@ -103,6 +103,16 @@ struct SimulatedMachine {
   }
 };
 
+/// One touch while it is made.
+struct TouchMade {
+  const calib::mfb::Measurement& measurement;
+  calib::mfb::Target target;
+  Vector3 place_m;    ///< of the tip, bar axes
+  Vector3 outward;    ///< normal of the surface, machine axes
+  double in_pass;     ///< share of the touches of the pass that were made before
+  double in_session;  ///< the same of all passes
+};
+
 /// What happens during the measurements.
 struct ProbingOptions {
   double noise = 1.0;        ///< factor of the noise of the plan
@@ -117,6 +127,10 @@ struct ProbingOptions {
   calib::mfb::TouchPattern pattern = paper_pattern();  ///< of the bar
   double place_m = 20e-6;  ///< of the features beside the pattern, in each direction
   bool signature = true;   ///< two holes are shifted by 1 mm
+  /// Displacement of a touched place, bar axes; may be empty.
+  std::function<Vector3(const TouchMade&)> displaced{};
+  /// Error of the machine at a reading beside that of ReadingOf, machine axes; may be empty.
+  std::function<Vector3(const TouchMade&, const Vector3& reading_m)> more_error_m{};
 };
 
 struct ProbedBar {
@@ -228,30 +242,42 @@ class Probing {
       std::reverse(order.begin(), order.end());
     }
     calib::mfb::PassTouches touches;
+    const double passes = static_cast<double>(plan_.measurements.size());
     for (const std::size_t k : order) {
-      const double time =
-          before + static_cast<double>(touches.size()) / static_cast<double>(order.size() - 1);
-      const Vector3 p_m = m.origin_m + clamping.moved_m + m.axes() * in_bar_m(k, m, clamping);
+      const double share =
+          static_cast<double>(touches.size()) / static_cast<double>(order.size() - 1);
+      const double time = before + share;
+      const TouchMade made{m,          nominal_[k].target,
+                           tips_m_[k], m.axes() * nominal_[k].outward,
+                           share,      (static_cast<double>(passes_made_) + share) / passes};
+      const Vector3 p_m = m.origin_m + clamping.moved_m + m.axes() * in_bar_m(k, m, clamping, made);
       const Vector3 noise_m = plan_.noise.machine_m * deviates() + plan_.noise.probe_m *
                                                                        normal_(random_) * m.axes() *
                                                                        nominal_[k].outward;
+      Vector3 reading_m = reading_m_(p_m, m.tool_offset_m);
+      if (options_.more_error_m) {
+        reading_m -= options_.more_error_m(made, reading_m);
+      }
       touches.push_back(
-          {nominal_[k].target,
-           reading_m_(p_m, m.tool_offset_m) + options_.noise * noise_m + time * drift_m, false});
+          {nominal_[k].target, reading_m + options_.noise * noise_m + time * drift_m, false});
     }
+    ++passes_made_;
     return touches;
   }
 
   Vector3 deviates() { return {normal_(random_), normal_(random_), normal_(random_)}; }
 
  private:
-  Vector3 in_bar_m(std::size_t k, const calib::mfb::Measurement& m,
-                   const Clamping& clamping) const {
+  Vector3 in_bar_m(std::size_t k, const calib::mfb::Measurement& m, const Clamping& clamping,
+                   const TouchMade& made) const {
     const double alpha_per_K = options_.expansion ? options_.expansion->alpha_per_K : 0.0;
     Vector3 p_m =
         (1.0 + options_.warmer_K * (alpha_per_K + options_.alpha_error_per_K)) * tips_m_[k];
     if (options_.sag) {
       p_m += sag_m(*options_.sag, tips_m_[k].x(), m.axes().transpose() * plan_.gravity);
+    }
+    if (options_.displaced) {
+      p_m += options_.displaced(made);
     }
     return SimulatedMachine::turned(clamping.turned_rad, p_m);
   }
@@ -264,6 +290,7 @@ class Probing {
   TrueBar bar_;
   std::vector<calib::mfb::NominalTouch> nominal_;
   std::vector<Vector3> tips_m_;
+  std::size_t passes_made_ = 0;
 };
 
 inline ProbedBar probe(ReadingOf reading_m, const calib::mfb::Plan& plan, std::mt19937_64& random,

@@ -1,11 +1,10 @@
 #include "abbe/calib/mfb/judge.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <optional>
 #include <string>
 
-#include "abbe/calib/environment/thermal_expansion.hpp"
 #include "message.hpp"
+#include "mfb/bar_temperature.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::mfb {
@@ -64,28 +63,16 @@ void judge_set_aside(Verdict& verdict, const Identification& found) {
 /// Refuses a temperature of the bar that is not that of a workshop. An error of it changes all
 /// lengths alike, which no residual shows.
 void judge_temperature(Verdict& verdict, const Observations& o, bool accepted) {
-  const auto from_reference_K = [](const PassObservation& pass) {
-    return std::abs(pass.temperature_K - kReferenceTemperature_K);
-  };
-  const auto worst = std::ranges::max_element(o.passes, {}, from_reference_K);
-  if (worst == o.passes.end() || from_reference_K(*worst) <= kMostFromReference_K) {
+  const std::optional<std::string> seen = bar_far_from_reference(o);
+  if (!seen) {
     return;
   }
-  const double off_K = worst->temperature_K - kReferenceTemperature_K;
-  constexpr double kReference_C = 20.0;
-  std::string seen =
-      message(o.plan.measurements[worst->measurement].name, ": the temperature of the bar is ",
-              kReference_C + off_K, " C, ", std::abs(off_K), " K from that of its calibration");
-  if (o.bar.expansion) {
-    seen +=
-        message(": all lengths change by ", 1e6 * o.bar.expansion->alpha_per_K * off_K, " um/m");
-  }
   if (accepted) {
-    verdict.notes.push_back(message(seen, ", explicitly accepted"));
+    verdict.notes.push_back(message(*seen, ", explicitly accepted"));
   } else {
     verdict.refuse(
         kBarTemperature,
-        message(seen, "; check temperature_C, in degrees Celsius; if it is right, accept ",
+        message(*seen, "; check temperature_C, in degrees Celsius; if it is right, accept ",
                 kBarTemperature));
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "message.hpp"
+#include "mfb/bar_temperature.hpp"
 #include "mfb/joint.hpp"
 #include "mfb/sequential.hpp"
 #include "units.hpp"
@@ -62,10 +63,14 @@ Result<void> check_shown(const Observations& o, const Solution& solution,
   for (const std::string& error : not_shown) {
     list += (list.empty() ? "" : ", ") + error;
   }
-  return failure(ErrorCode::RankDeficient,
-                 message("identification: the positions of the bar do not show ", list,
-                         "; at most ", options.most_u_m * kUmPerM, " um and ",
-                         options.most_u_rad * kUmPerM, " urad: measure in further positions"));
+  // Far from 20 C the uncertainty of the expansion is that of the scales.
+  const std::optional<std::string> far = bar_far_from_reference(o);
+  return failure(
+      ErrorCode::RankDeficient,
+      message("identification: the positions of the bar do not show ", list, "; at most ",
+              options.most_u_m * kUmPerM, " um and ", options.most_u_rad * kUmPerM, " urad: ",
+              far ? message(*far, "; check temperature_C, in degrees Celsius")
+                  : "measure in further positions"));
 }
 
 Result<Solution> solve(const Observations& o, const SolveOptions& options) {

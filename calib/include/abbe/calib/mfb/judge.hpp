@@ -18,9 +18,6 @@ namespace abbe::calib::mfb {
 
 /// Entry in the configuration that permits a bar more than kMostFromReference_K from 20 C.
 inline constexpr std::string_view kBarTemperature = "bar-temperature";
-/// A bar farther from 20 C is asked for by name: degrees Fahrenheit and typing errors are no
-/// temperatures of a workshop, and residuals show no wrong one.
-inline constexpr double kMostFromReference_K = 12.0;
 
 struct JudgeOptions {
   GateLimits limits{};

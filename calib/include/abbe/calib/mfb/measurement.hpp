@@ -35,6 +35,10 @@ struct Measurement {
   [[nodiscard]] Matrix3 axes() const;
 };
 
+/// A bar farther from 20 C is asked for by name: degrees Fahrenheit and typing errors are no
+/// temperatures of a workshop, and residuals show no wrong one.
+inline constexpr double kMostFromReference_K = 12.0;
+
 /// Standard uncertainties (k = 1).
 struct TouchNoise {
   double probe_m = 0.0;          ///< of one touch along the normal of the surface

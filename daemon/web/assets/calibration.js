@@ -3,7 +3,7 @@
 import { ask } from "./ask.js";
 import { fixed, h, list, table } from "./dom.js";
 import { get, listen, post, state } from "./server.js";
-import { message, withdraw } from "./main.js";
+import { message, withdraw } from "./message.js";
 import { Space } from "./space.js";
 
 const running = (session) => ["warming", "acquiring", "identifying", "judged"].includes(session.state);

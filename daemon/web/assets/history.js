@@ -2,7 +2,7 @@
 
 import { ask } from "./ask.js";
 import { h, list, table, when } from "./dom.js";
-import { message } from "./main.js";
+import { message } from "./message.js";
 import { get, listen, post, state } from "./server.js";
 import { smallChart } from "./small_charts.js";
 

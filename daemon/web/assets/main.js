@@ -1,6 +1,7 @@
 // The frame of the page: views by the part of the address behind "#", states, log in.
 
 import { h } from "./dom.js";
+import { message } from "./message.js";
 import { connect, disconnect, get, listen, post, state } from "./server.js";
 
 const views = {
@@ -51,15 +52,6 @@ async function show() {
     if (number === shown) place.append(h("p", { class: "bad" }, error.message));
   }
   find("view").dataset.ready = name;
-}
-
-export function message(text) {
-  find("message").textContent = text;
-}
-
-/** Removes the message if it is one of `texts`. */
-export function withdraw(texts) {
-  if (texts.includes(find("message").textContent)) message("");
 }
 
 listen("lost", (reason) => {

@@ -1,7 +1,7 @@
 // Recordings: download, replay and comparison with the live run.
 
 import { bytes, facts, h, table, when } from "./dom.js";
-import { message } from "./main.js";
+import { message } from "./message.js";
 import { get, listen, post, state } from "./server.js";
 
 const mayReplay = () => ["calibrate", "administer"].includes(state.me.role);

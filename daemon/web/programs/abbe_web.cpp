@@ -117,8 +117,8 @@ class Health {
   std::chrono::steady_clock::time_point next_;
 };
 
-/// Until SIGTERM or SIGINT, or until the page cannot serve. Feeds the watchdog of systemd as long as
-/// the page is served: then systemd starts a page anew that cannot be reached.
+/// Until SIGTERM or SIGINT, or until the page cannot serve. Feeds the watchdog of systemd as long
+/// as the page is served: then systemd starts a page anew that cannot be reached.
 int run_until_stop(const sigset_t& stop, const abbe::web::PageServer& page) {
   const bool watched = abbe::daemon::watchdog_period().has_value();
   const timespec period{.tv_sec = 1, .tv_nsec = 0};

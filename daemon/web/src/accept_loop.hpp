@@ -12,8 +12,8 @@
 namespace abbe::web {
 
 /// Accepts connections on a thread of its own. The loop of httplib 0.11 closes its socket after an
-/// error that passes, for example ENFILE, and then waits for its open connections: the server cannot
-/// be reached, and does not end either.
+/// error that passes, for example ENFILE, and then waits for its open connections: the server
+/// cannot be reached, and does not end either.
 class AcceptLoop {
  public:
   using Clock = std::chrono::steady_clock;

@@ -11,7 +11,8 @@ struct ByteRange {
   std::uint64_t first = 0, bytes = 0;
 };
 
-/// The answer to the header Range of a request for a file of `size` bytes ([RFC 9110] 14.1.2, 14.2).
+/// The answer to the header Range of a request for a file of `size` bytes ([RFC 9110] 14.1.2,
+/// 14.2).
 struct RangeAnswer {
   std::optional<ByteRange> part;  ///< absent: the whole file
   bool beyond_end = false;        ///< no byte of the range exists: status 416

@@ -26,8 +26,9 @@ inline constexpr const char* kRangeHeader = "xange";
 /// A client that reads slower than this on average does not get the whole answer.
 inline constexpr std::size_t kSlowestReader_bytes_per_s = 4096;
 
-/// While connections wait for a thread, a request, and the reader of an answer, get this time instead
-/// of that of ConnectionLimits: silent clients of several addresses cannot keep all threads.
+/// While connections wait for a thread, a request, and the reader of an answer, get this time
+/// instead of that of ConnectionLimits: silent clients of several addresses cannot keep all
+/// threads.
 inline constexpr std::chrono::milliseconds kCrowdedTime{2000};
 
 /// Numeric address of the client of a connection; empty if it has left.

@@ -64,8 +64,8 @@ class LimitedServer final : public httplib::Server {
   /// Answers a request that admits() refuses.
   void refuse_rate(ConnectionStream& stream, const std::string& address);
   void report_fault(const ConnectionStream& stream, const std::string& address);
-  /// Reads what the client still sends: after close() with unread input the kernel would discard the
-  /// answer (RFC 9112, 9.6).
+  /// Reads what the client still sends: after close() with unread input the kernel would discard
+  /// the answer (RFC 9112, 9.6).
   void discard_input(int fd) const;
 
   TlsContext tls_;

@@ -61,8 +61,7 @@ json field_json(const calib::VolumetricModel& model) {
   constexpr int n = kFieldPerSide;
   for (int i = 0; i < n * n * n; ++i) {
     const Vector3 at_m = low_m + step_m.cwiseProduct(Vector3(i % n, i / n % n, i / n / n));
-    const calib::VolumetricError error =
-        model.error_at(at_m, tool_m, calib::estimation::AxisTravel{});
+    const calib::VolumetricError error = model.error_at(at_m, tool_m, calib::AxisTravel{});
     if (!error.inside || !error.tool_ok) continue;
     vectors.push_back({{"at_mm", vector_json(at_m, kMmPerM)},
                        {"V_um", vector_json(error.V_m, kUmPerM)},

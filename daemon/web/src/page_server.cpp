@@ -31,8 +31,9 @@ using Handling = httplib::Server::HandlerResponse;
 /// Besides one for each open page. More than the connections of one address, so that another one
 /// still gets an answer.
 constexpr std::size_t kThreadsForRequests = LimitedServer::kConnectionsOfAddress + 16;
-/// Of a connection for a thread, after which the watchdog restarts the page. Longer than the slowest
-/// client may read an answer: clients that fill all threads must not end the sessions of the others.
+/// Of a connection for a thread, after which the watchdog restarts the page. Longer than the
+/// slowest client may read an answer: clients that fill all threads must not end the sessions of
+/// the others.
 constexpr std::chrono::minutes kLongestWait{5};
 /// Of a connection for a thread, after which silent and slow clients get only kCrowdedTime.
 constexpr std::chrono::milliseconds kCrowdedAfter{500};

@@ -7,8 +7,8 @@
 
 namespace abbe::web {
 
-/// Limits the requests of each client (client_network()): `at_once` at any time, `per_second` on average (token
-/// bucket). Thread-safe.
+/// Limits the requests of each client (client_network()): `at_once` at any time, `per_second` on
+/// average (token bucket). Thread-safe.
 class RequestRate {
  public:
   using Clock = std::chrono::steady_clock;

@@ -32,7 +32,8 @@ class WorkerPool {
   /// Serves the connections that wait, and ends the threads.
   ~WorkerPool();
 
-  /// False if each thread has a connection and kMostWaiting others wait; `serve` is then not called.
+  /// False if each thread has a connection and kMostWaiting others wait; `serve` is then not
+  /// called.
   [[nodiscard]] bool enqueue(Serve serve);
   /// How long the connection that waits longest has waited; 0: none waits.
   [[nodiscard]] std::chrono::nanoseconds longest_wait(Clock::time_point now) const;

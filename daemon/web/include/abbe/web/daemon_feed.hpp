@@ -38,7 +38,8 @@ class DaemonFeed {
   DaemonFeed& operator=(const DaemonFeed&) = delete;
   ~DaemonFeed();
 
-  /// The last answer to "status", null before the first and while abbed does not answer. Any thread.
+  /// The last answer to "status", null before the first and while abbed does not answer. Any
+  /// thread.
   [[nodiscard]] nlohmann::json status() const;
   /// {"session", "request", "driven_mm", "bars": see bars_of()} of the present or last session; the
   /// request as abbed received it, lengths in m. Any thread.
@@ -68,8 +69,8 @@ class DaemonFeed {
   Clock::time_point next_status_{}, next_files_{};
   std::string source_fault_ = "not asked yet";
   std::string files_seen_;
-  /// nullopt: not posted yet. An empty notice is posted as well: a page that was open before a restart
-  /// of abbe-web may show an earlier one.
+  /// nullopt: not posted yet. An empty notice is posted as well: a page that was open before a
+  /// restart of abbe-web may show an earlier one.
   std::optional<std::string> notice_seen_;
   bool acquiring_ = false;
   bool request_known_ = false;  ///< of the session path_.session

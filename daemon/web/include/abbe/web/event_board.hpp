@@ -21,7 +21,7 @@ enum class Topic : std::uint8_t {
   Live,         ///< axis positions
   Calibration,  ///< a session began
   Store,        ///< models or recordings changed
-  Notice,       ///< a task for the administrator, e.g. an expiring certificate: PageServer::notice()
+  Notice,  ///< a task for the administrator, e.g. an expiring certificate: PageServer::notice()
 };
 inline constexpr std::size_t kTopics = 6;
 

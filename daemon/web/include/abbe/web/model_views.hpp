@@ -1,7 +1,7 @@
 #pragma once
 /// What the page shows of the model store, as JSON. Lengths in mm, errors in um and urad, dates as
-/// RFC 3339. Other processes change the store: what is kept is used only while the files that it was
-/// made of have the same inode, time and size. Thread-safe.
+/// RFC 3339. Other processes change the store: what is kept is used only while the files that it
+/// was made of have the same inode, time and size. Thread-safe.
 
 #include <atomic>
 #include <chrono>

@@ -9,8 +9,8 @@
 
 namespace abbe::web {
 
-/// The places of open pages: at most `most`, and of these at most three quarters for one address, so
-/// that a computer that opens page after page leaves places for others.
+/// The places of open pages: at most `most`, and of these at most three quarters for one address,
+/// so that a computer that opens page after page leaves places for others.
 ///
 /// A page reports that it reads its events. One that has not done so for some time loses its place
 /// as soon as another page needs it, because the buffers of a connection take events that the page

@@ -10,12 +10,12 @@
 #include <span>
 #include <string>
 
-#include "abbe/calib/evemu/judge.hpp"
-#include "abbe/calib/evemu/solve.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/judge.hpp"
-#include "abbe/calib/sparse/cross_validation.hpp"
-#include "elementary.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
+#include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
 #include "evemu_run.hpp"
 #include "otf_run.hpp"
 

@@ -3,8 +3,8 @@
 //
 //   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]] [--machine NAME MACHINE_ID]
 //
-// It prints for every Compensation of every machine whether it may be applied, and when one that may
-// be applied may no longer be, because nothing newer has arrived. KEYS is the folder
+// It prints for every Compensation of every machine whether it may be applied, and when one that
+// may be applied may no longer be, because nothing newer has arrived. KEYS is the folder
 // of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
 // identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
 // name is used, and no other one while the program runs. Fast DDS calls the
@@ -364,9 +364,9 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
     transport = abbe::dds::with_message_filter(transport, protection, window);
 }
 
-/// A generated type whose deserialize() does not throw: any participant of the domain may send bytes
-/// that are no valid message, and an exception in a thread of Fast DDS ends the process. Such a
-/// sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
+/// A generated type whose deserialize() does not throw: any participant of the domain may send
+/// bytes that are no valid message, and an exception in a thread of Fast DDS ends the process. Such
+/// a sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
 /// the next sample.)
 /// It has no more than kInstances keys, by a hash of the generated one: strangers may make up any
 /// number of keys, and Fast DDS 2.9 aborts where the table of instances is full. Of two machines

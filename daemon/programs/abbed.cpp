@@ -77,7 +77,8 @@ std::string dds_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
 }
 
-/// Keys that belong to the user of abbe-dds can be checked by root only: abbe-dds checks them itself.
+/// Keys that belong to the user of abbe-dds can be checked by root only: abbe-dds checks them
+/// itself.
 Result<void> check_dds_keys(const DdsConfig& dds) {
   const auto& security = dds.security;
   if (security.empty()) return {};
@@ -158,8 +159,8 @@ int report_machine(const std::optional<abbe::drivers::IppStop>& machine, int cod
                                                      : ExitCode::StopNotConfirmed);
 }
 
-/// Stops all parts and reports it; returns the exit code. Ends the process at once if that takes too
-/// long.
+/// Stops all parts and reports it; returns the exit code. Ends the process at once if that takes
+/// too long.
 int end_in_order(std::unique_ptr<Abbed> abbed, int code) {
   notify_stopping();
   const ExitDeadline deadline{

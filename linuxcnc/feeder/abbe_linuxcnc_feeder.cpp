@@ -61,7 +61,8 @@ int fail(const std::string& text, daemon::ExitCode code) {
   return number(code);
 }
 
-/// Prints whether the correction is applied, and why not, when this changes. In a thread of its own:
+/// Prints whether the correction is applied, and why not, when this changes. In a thread of its
+/// own:
 /// a terminal that is halted, or a full pipe, delays neither the decisions nor the loop.
 class Reporter {
  public:

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 
 namespace abbe::linuxcnc {
 namespace {

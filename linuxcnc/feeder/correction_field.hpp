@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/calib/error_lattice.hpp"
+#include "abbe/calib/model/error_lattice.hpp"
 #include "hand_over.h"
 
 namespace abbe::linuxcnc {

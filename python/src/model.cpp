@@ -53,8 +53,8 @@ py::array_t<double> table_of(std::span<const Vector3> rows) {
 /// Direction of travel of X, Y, Z: -1, 0 (unknown) or 1 each.
 using Direction = std::optional<std::array<int, 3>>;
 
-calib::estimation::AxisTravel travel_of(const ModelDocument& document, const Direction& direction) {
-  calib::estimation::AxisTravel travel{};
+calib::AxisTravel travel_of(const ModelDocument& document, const Direction& direction) {
+  calib::AxisTravel travel{};
   if (!direction) return travel;
   if (document.model.travel() == nullptr)
     throw Raised({daemon::ErrorCode::DataInsufficient,
@@ -65,7 +65,7 @@ calib::estimation::AxisTravel travel_of(const ModelDocument& document, const Dir
     const int towards = (*direction)[a];
     if (towards < -1 || towards > 1)
       refuse(fmt::format("direction: {} for {}: must be -1, 0 (unknown) or 1", towards, "XYZ"[a]));
-    travel[a] = static_cast<calib::estimation::Travel>(towards);
+    travel[a] = static_cast<calib::Travel>(towards);
   }
   return travel;
 }

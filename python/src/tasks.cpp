@@ -1,5 +1,5 @@
-// Requests for a calibration from the files of a user, as JSON texts: read and checked as the command
-// line does.
+// Requests for a calibration from the files of a user, as JSON texts: read and checked as the
+// command line does.
 #include <pybind11/stl.h>
 
 #include <filesystem>

@@ -11,8 +11,8 @@ namespace {
 constexpr double kMetresPerSecondPerFeed = 1e-3 / 60.0;  // mm/min
 constexpr std::size_t kFeed = 3;                         // column
 
-/// Feed of the leg that ends at this row; 0 (the feed of the plan applies) if the file has no column
-/// of feeds or the cell of this row is empty.
+/// Feed of the leg that ends at this row; 0 (the feed of the plan applies) if the file has no
+/// column of feeds or the cell of this row is empty.
 double feed_m_per_s(const protocol::NumberTable& table, std::size_t row, protocol::Faults& faults) {
   if (!table.has(kFeed) || std::isnan(table.at(row, kFeed))) return 0.0;
   if (table.at(row, kFeed) <= 0.0)

@@ -1,6 +1,7 @@
 #pragma once
-/// Compares phases of a run with requests (of programs or pages) to those without. The peer is the same comparison between
-/// the odd and the even phases without requests: it shows what other load on the computer changes.
+/// Compares phases of a run with requests (of programs or pages) to those without. The peer is the
+/// same comparison between the odd and the even phases without requests: it shows what other load
+/// on the computer changes.
 
 #include <fmt/format.h>
 

@@ -226,8 +226,8 @@ Field drawn_machine(unsigned seed) {
   }
 
   c = zero_at(design, {-0.09, 0.14, 0.03}) * c;
-  const EvemuModel model =
-      *EvemuModel::of(design, {-0.09, 0.14, 0.03}, c, Eigen::MatrixXd::Zero(45, 45));
+  const PolynomialModel model =
+      *PolynomialModel::of(design, {-0.09, 0.14, 0.03}, c, Eigen::MatrixXd::Zero(45, 45));
 
   return [model](const Vector3& q) { return model.V_at(q); };
 }

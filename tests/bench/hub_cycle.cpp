@@ -26,8 +26,8 @@
 #include <string_view>
 #include <thread>
 
-#include "abbe/calib/interpolation_grid.hpp"
-#include "abbe/calib/otf/plan.hpp"
+#include "abbe/calib/model/interpolation_grid.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/drivers/status_board.hpp"
 #include "abbe/service/background_tasks.hpp"

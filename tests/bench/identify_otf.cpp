@@ -22,9 +22,9 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/gauge.hpp"
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "config_tables.hpp"

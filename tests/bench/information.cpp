@@ -24,10 +24,10 @@
 
 #include "abbe/calib/estimation/datum.hpp"
 #include "abbe/calib/estimation/information.hpp"
-#include "abbe/calib/estimation/sparse_information.hpp"
-#include "abbe/calib/estimation/table_basis.hpp"
-#include "abbe/calib/gauge.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/geometry/table_basis.hpp"
+#include "abbe/calib/internal/estimation/sparse_information.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/model/gauge.hpp"
 
 namespace {
 

@@ -12,7 +12,7 @@
 #include <ctime>
 #include <map>
 
-#include "abbe/calib/mfb/monte_carlo.hpp"
+#include "abbe/calib/mfb/identify/monte_carlo.hpp"
 #include "mfb_simulation.hpp"
 
 namespace {

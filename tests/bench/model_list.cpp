@@ -1,7 +1,7 @@
 /// Requirement: with 10,000 models in the store, `abbe model list` and the History of the page take
 /// 0.3 s at most with index and warm disk cache, and one more model brings the index up to date
-/// within 20 ms. Measured beside them: the time to read one model.json, which is what a list without
-/// index needs for each model. Build type Release.
+/// within 20 ms. Measured beside them: the time to read one model.json, which is what a list
+/// without index needs for each model. Build type Release.
 ///     bench_model_list [--short]        --short: 1000 models, with the limits of 10,000
 
 #include <fmt/format.h>

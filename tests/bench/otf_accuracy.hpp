@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "../never_worse/otf_run.hpp"
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/lack_of_fit.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/judge/lack_of_fit.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "abbe/sim/truth_machine.hpp"
 

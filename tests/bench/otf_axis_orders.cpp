@@ -11,8 +11,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "otf_accuracy.hpp"
 
 namespace {

@@ -12,15 +12,15 @@
 #include <cstdlib>
 #include <ctime>
 
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "otf_accuracy.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests;
-using estimation::Interpolation;
+using calib::Interpolation;
 using otf_accuracy::OtfRun;
 using otf_accuracy::Sums;
 

@@ -6,8 +6,8 @@
 //   sample as a block at most 5 % above its 0.0943 um (two-step);
 // - 20 simulated machines, white noise: root mean square of the error at most 1.02 times the
 //   Cramer-Rao bound, mean squared normalised error 0.9 to 1.1;
-// - the same with noise that is correlated over 1 s: mean squared normalised error 0.85 to 1.15, and
-//   an error not larger than without prewhitening.
+// - the same with noise that is correlated over 1 s: mean squared normalised error 0.85 to 1.15,
+//   and an error not larger than without prewhitening.
 // ABBE_REF_DIR names the folder of the reference data, by default beside the clone.
 //
 //   bench_otf_joint [machines = 20] [first seed = 1]
@@ -20,9 +20,9 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_accuracy.hpp"
 #include "otf_reference.hpp"
 

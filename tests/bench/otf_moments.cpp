@@ -15,8 +15,8 @@
 #include <cstring>
 #include <vector>
 
-#include "abbe/calib/otf/moments.hpp"
-#include "abbe/calib/otf/solve.hpp"
+#include "abbe/calib/otf/live/moments.hpp"
+#include "abbe/calib/otf/solve/solve.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -58,8 +58,8 @@ void accumulate(MomentAccumulator& moments, const Path& path,
 }
 
 /// Two rows per 100 samples.
-Observations block_rows(const estimation::TableBasis& basis, const Path& path,
-                        const Vector3& target_m, const std::vector<std::vector<Vector3>>& legs) {
+Observations block_rows(const calib::TableBasis& basis, const Path& path, const Vector3& target_m,
+                        const std::vector<std::vector<Vector3>>& legs) {
   Observations o{.basis = basis, .target_offset_m = target_m};
   for (std::size_t leg = 0; leg < legs.size(); ++leg) {
     std::vector<TrackerObservation> means;
@@ -101,7 +101,7 @@ int main(int argc, char** argv) {
   const int runs = argc > 1 && std::strcmp(argv[1], "--short") == 0 ? 3 : 11;
   const Machine machine = ref::case_a_machine();
   const Path path = ref::case_a_path();
-  const auto basis = *estimation::TableBasis::of(ref::layout_of(machine));
+  const auto basis = *calib::TableBasis::of(ref::layout_of(machine));
   const auto legs = points_by_leg(path, machine.target_offset_m);
   const MomentAccumulator empty = *MomentAccumulator::of(
       {basis, machine.target_offset_m, ref::case_a_alignment(true), Noise{}});

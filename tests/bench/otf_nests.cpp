@@ -21,8 +21,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "nest_run.hpp"
 #include "otf_accuracy.hpp"
 #include "otf_reference.hpp"

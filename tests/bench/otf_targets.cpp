@@ -14,8 +14,8 @@
 #include <cstdlib>
 #include <ctime>
 
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/targets.hpp"
+#include "abbe/calib/otf/identify/targets.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "otf_accuracy.hpp"
 
 namespace {
@@ -48,16 +48,16 @@ Compared compare_for_tool(const OtfRun& run, const VolumetricModel& model, const
   const auto rows = static_cast<Eigen::Index>(3 * positions.size());
   Eigen::MatrixXd D = Eigen::MatrixXd::Zero(rows, model.U().size()), B(rows, 6);
   Eigen::VectorXd e(rows);
-  std::vector<estimation::Column> memory(model.tables()->most_columns());
+  std::vector<calib::Column> memory(model.tables()->most_columns());
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const auto first = static_cast<Eigen::Index>(3 * i);
     const Vector3& q = positions[i];
     e.segment<3>(first) = model.V_at(q, tool_m) - abbe::sim::error_m(truth, q);
     B.block<3, 3>(first, 0) = Matrix3::Identity();
     B.block<3, 3>(first, 3) = rotation_effect(q + tool_m);
-    estimation::ModelColumns columns(memory);
+    calib::ModelColumns columns(memory);
     model.tables()->append_columns({.q_m = q, .tool_offset_m = tool_m}, columns);
-    for (const estimation::Column& c : columns.span()) {
+    for (const calib::Column& c : columns.span()) {
       D.block<3, 1>(first, static_cast<Eigen::Index>(c.parameter)) += c.dV_dU;
     }
   }

@@ -1,7 +1,7 @@
 // What the page costs: abbed calibrates a simulated machine on the fly in real time
-// (calibrated_run.hpp), and ten pages read the events of abbe-web, which posts the positions 50 times
-// a second. Requirements: no change in the latency of the acquisition threads, no sample lost,
-// abbe-web uses at most 5 % of a processor, and each page receives the positions.
+// (calibrated_run.hpp), and ten pages read the events of abbe-web, which posts the positions 50
+// times a second. Requirements: no change in the latency of the acquisition threads, no sample
+// lost, abbe-web uses at most 5 % of a processor, and each page receives the positions.
 // Phases without and with pages alternate in the same run, so that other load on the computer meets
 // both alike; abbe-web runs in both.
 //   bench_page_load [--short]
@@ -21,8 +21,8 @@
 #include <fstream>
 #include <map>
 #include <memory>
-#include <stdexcept>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <thread>

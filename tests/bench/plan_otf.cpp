@@ -10,12 +10,12 @@
 #include <cstring>
 #include <ctime>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/path_frame.hpp"
-#include "abbe/calib/otf/plan.hpp"
-#include "abbe/calib/otf/polyline.hpp"
-#include "abbe/calib/parameter_layout.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/geometry/parameter_layout.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
+#include "abbe/calib/otf/run/path_frame.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
 
 namespace {
 

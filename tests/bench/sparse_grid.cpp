@@ -18,9 +18,9 @@
 #include <thread>
 #include <vector>
 
-#include "abbe/calib/sparse/cross_validation.hpp"
-#include "abbe/calib/sparse/standardise.hpp"
-#include "abbe/calib/sparse/sweep.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
+#include "abbe/calib/internal/sparse/standardise.hpp"
+#include "abbe/calib/internal/sparse/sweep.hpp"
 #include "residual_descent.hpp"
 #include "sparse_reference.hpp"
 

@@ -11,9 +11,9 @@
 #include <optional>
 #include <utility>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "otf_run.hpp"
 
 namespace {

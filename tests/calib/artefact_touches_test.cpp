@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/calib/evemu/artefact_touches.hpp"
+#include "abbe/calib/evemu/plan/artefact_touches.hpp"
 
 namespace abbe::calib::evemu {
 namespace {

@@ -1,4 +1,4 @@
-#include "abbe/calib/estimation/axis_interpolation.hpp"
+#include "abbe/calib/geometry/axis_interpolation.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,6 @@
 
 namespace {
 using namespace abbe::calib;
-using namespace abbe::calib::estimation;
 
 const std::vector<double> kNodes_m{-0.3, -0.26, -0.17, -0.05, 0.0, 0.08, 0.1};  // unequal cells
 

@@ -1,4 +1,4 @@
-#include "abbe/calib/axis_mistakes.hpp"
+#include "abbe/calib/geometry/axis_mistakes.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "chi2_tail.hpp"
+#include "abbe/calib/internal/statistics/chi2_tail.hpp"
 
 #include <gtest/gtest.h>
 

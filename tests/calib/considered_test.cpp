@@ -1,4 +1,4 @@
-#include "abbe/calib/estimation/considered.hpp"
+#include "abbe/calib/internal/estimation/considered.hpp"
 
 #include <gtest/gtest.h>
 

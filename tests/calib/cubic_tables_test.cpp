@@ -5,17 +5,16 @@
 #include <cmath>
 #include <vector>
 
-#include "abbe/calib/gate.hpp"
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/model_drift.hpp"
-#include "abbe/calib/model_update.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/gate.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/model/model_drift.hpp"
+#include "abbe/calib/model/model_update.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 #include "otf_run.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::tests::otf;
-using estimation::Interpolation;
 using testing::HasSubstr;
 
 const Vector3 kCubicTool(0.02, -0.015, -0.12);
@@ -67,13 +66,13 @@ TEST(CubicModel, GivesTheReferenceErrorsAt50Points) {
 
 TEST(CubicModel, PropagatesItsFullCovariance) {
   const VolumetricModel model = random_cubic();
-  std::vector<estimation::Column> memory(model.tables()->most_columns());
+  std::vector<Column> memory(model.tables()->most_columns());
   for (const Vector3& q :
        {Vector3(0.13, -0.11, -0.27), Vector3(-0.3, 0.25, 0.0), Vector3(0.31, 0.2, -0.2)}) {
-    estimation::ModelColumns columns(memory);
+    ModelColumns columns(memory);
     model.tables()->append_columns({.q_m = q, .tool_offset_m = kCubicTool}, columns);
     Eigen::MatrixXd MB = Eigen::MatrixXd::Zero(3, model.U().size());
-    for (const estimation::Column& c : columns.span()) {
+    for (const Column& c : columns.span()) {
       MB.col(static_cast<Eigen::Index>(c.parameter)) += c.dV_dU;
     }
     const VolumetricError e = model.error_at(q, kCubicTool);

@@ -6,8 +6,8 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "abbe/calib/estimation/null_space.hpp"
-#include "abbe/calib/gauge.hpp"
+#include "abbe/calib/internal/estimation/null_space.hpp"
+#include "abbe/calib/model/gauge.hpp"
 
 namespace {
 using namespace abbe::calib;

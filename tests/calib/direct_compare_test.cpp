@@ -1,5 +1,5 @@
-/// Directly measured error motions of a simulated machine against a model that was identified from a
-/// tracker run on the same machine.
+/// Directly measured error motions of a simulated machine against a model that was identified from
+/// a tracker run on the same machine.
 
 #include "abbe/calib/direct/compare.hpp"
 

@@ -1,13 +1,13 @@
 /// Verdicts on simulated tables: how often they are wrong, and what they cannot find.
 
-#include "direct/judge.hpp"
+#include "abbe/calib/internal/direct/judge.hpp"
 
 #include <gmock/gmock.h>
 
 #include <random>
 
-#include "direct/convention.hpp"
-#include "direct/scatter.hpp"
+#include "abbe/calib/internal/direct/convention.hpp"
+#include "abbe/calib/internal/direct/scatter.hpp"
 
 namespace abbe::calib::direct {
 namespace {

@@ -57,8 +57,8 @@ TEST_F(DirectVolume, AgreesWithinTheUncertaintyOfBoth) {
   EXPECT_NEAR(c.V_measured.mean_m / c.V_model.mean_m, 1.0, 0.1);
 }
 
-/// With squareness, wherever it was measured, the measured model is the whole machine: its V is that
-/// of the truth.
+/// With squareness, wherever it was measured, the measured model is the whole machine: its V is
+/// that of the truth.
 TEST_F(DirectVolume, OfAllErrorsIsTheMachine) {
   for (const Vector3& at : {Vector3(0.1, -0.2, -0.3), Vector3(-0.2, 0.1, -0.1)}) {
     auto errors = exact();

@@ -1,5 +1,5 @@
 /// Compared with the C library in extended precision, 64 bits on x86-64.
-#include "elementary.hpp"
+#include "abbe/calib/internal/statistics/elementary.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,15 +1,15 @@
 /// Uncertainty and temperature of the ball array itself, propagated from the calibrator into V and
 /// its covariance.
-#include "abbe/calib/evemu/artefact_rows.hpp"
+#include "abbe/calib/internal/evemu/solve/artefact_rows.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 
-#include "abbe/calib/evemu/design_rows.hpp"
-#include "abbe/calib/evemu/judge.hpp"
-#include "abbe/calib/sparse/cross_validation.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
+#include "abbe/calib/internal/evemu/solve/design_rows.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
 #include "evemu_artefact.hpp"
 
 namespace {

@@ -1,6 +1,6 @@
 /// The reference touches of the whole artefact, passed to the guide one by one in the order of its
 /// plan, and the guide's messages after wrong touches.
-#include "abbe/calib/evemu/touch_guide.hpp"
+#include "abbe/calib/evemu/live/touch_guide.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // Inputs that observe() refuses, and how its message names the cause.
-#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "abbe/calib/evemu/lack_of_fit.hpp"
+#include "abbe/calib/evemu/judge/lack_of_fit.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 #include <ostream>
 #include <string>
 
-#include "abbe/calib/evemu/judge.hpp"
-#include "elementary.hpp"
-#include "evemu/touch_residuals.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
+#include "abbe/calib/internal/evemu/judge/touch_residuals.hpp"
+#include "abbe/calib/internal/statistics/elementary.hpp"
 #include "evemu_run.hpp"
 
 namespace {

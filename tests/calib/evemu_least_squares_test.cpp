@@ -8,8 +8,8 @@
 #include <sstream>
 #include <string>
 
-#include "abbe/calib/evemu/noise.hpp"
-#include "evemu/fit_coefficients.hpp"
+#include "abbe/calib/evemu/solve/noise.hpp"
+#include "abbe/calib/internal/evemu/solve/fit_coefficients.hpp"
 #include "evemu_study.hpp"
 
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <random>
 
-#include "abbe/calib/evemu/equivalent_model.hpp"
-#include "abbe/calib/evemu/scaled_design.hpp"
+#include "abbe/calib/geometry/equivalent_model.hpp"
+#include "abbe/calib/geometry/scaled_design.hpp"
 #include "evemu_reference.hpp"
 
 namespace {

@@ -1,4 +1,4 @@
-#include "abbe/calib/evemu/noise.hpp"
+#include "abbe/calib/evemu/solve/noise.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
-#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "abbe/calib/evemu/design_rows.hpp"
+#include "abbe/calib/internal/evemu/solve/design_rows.hpp"
 #include "evemu_run.hpp"
 
 namespace {

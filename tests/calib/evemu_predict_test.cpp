@@ -2,14 +2,14 @@
 
 #include <cmath>
 
-#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
 #include "allocation_count.hpp"
 #include "evemu_run.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-TEST(EvemuModel, PredictsWithUncertaintyWithoutTakingMemory) {
+TEST(PolynomialModel, PredictsWithUncertaintyWithoutTakingMemory) {
   const auto observations =
       observe_errors(tests::evemu::reference_errors(), tests::evemu::reference_machine());
   const auto solution = solve(*observations);

@@ -1,5 +1,5 @@
 /// Gains of added columns, compared with ratios of the densities of the normal distribution.
-#include "evemu/screen.hpp"
+#include "abbe/calib/internal/evemu/run/screen.hpp"
 
 #include <gtest/gtest.h>
 

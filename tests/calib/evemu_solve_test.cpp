@@ -1,4 +1,4 @@
-#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
 #include "evemu_study.hpp"
 
 namespace {
@@ -156,7 +156,7 @@ TEST(EvemuSolution, HoldsForItsToolOnly) {
 
 TEST(EvemuSolution, PropagatesItsFullCovariance) {
   const Solution s = *solve(reference_observations());
-  const EvemuModel& m = *s.model.polynomials();
+  const PolynomialModel& m = *s.model.polynomials();
   for (const Vector3& q :
        {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.0, 0.07), Vector3(0.3, 0.15, 0.01)}) {
     const Eigen::Matrix3Xd B = m.design().B(q);
@@ -449,11 +449,11 @@ TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
 TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {
   const Observations o = reference_observations();
   const Solution s = *solve(o);
-  const EvemuModel& m = *s.model.polynomials();
+  const PolynomialModel& m = *s.model.polynomials();
   const Eigen::VectorXd turned =
       m.c_m() + m.design().rotation_about(m.ball1_m()) * Vector3(1e-3, 2e-3, -1e-3);
   const VolumetricModel other = *VolumetricModel::from_polynomials(
-      *EvemuModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()), Gauge::Ball1,
+      *PolynomialModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()), Gauge::Ball1,
       Vector3::Zero(), s.model.validity());
   const auto true_array = held_out(o, s.statistics.s_m, &s.model),
              as_turned = held_out(o, s.statistics.s_m, &other);

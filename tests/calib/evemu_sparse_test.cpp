@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "abbe/calib/evemu/judge.hpp"
-#include "abbe/calib/sparse/cross_validation.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
 #include "evemu_run.hpp"
 
 namespace {

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include "abbe/calib/fit/circle.hpp"
 #include "abbe/calib/fit/cylinder.hpp"
-#include "abbe/calib/fit/line.hpp"
 #include "abbe/calib/fit/plane.hpp"
 #include "abbe/calib/fit/sphere.hpp"
+#include "abbe/calib/internal/fit/circle.hpp"
+#include "abbe/calib/internal/fit/line.hpp"
 #include "mfb_reference.hpp"
 
 namespace {

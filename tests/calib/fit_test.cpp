@@ -6,11 +6,11 @@
 #include <numbers>
 #include <random>
 
-#include "abbe/calib/fit/circle.hpp"
 #include "abbe/calib/fit/cylinder.hpp"
-#include "abbe/calib/fit/line.hpp"
 #include "abbe/calib/fit/plane.hpp"
 #include "abbe/calib/fit/sphere.hpp"
+#include "abbe/calib/internal/fit/circle.hpp"
+#include "abbe/calib/internal/fit/line.hpp"
 
 namespace {
 using namespace abbe::calib;

@@ -1,4 +1,4 @@
-#include "abbe/calib/gate.hpp"
+#include "abbe/calib/model/gate.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <random>
 #include <utility>
 
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "evemu_study.hpp"
 #include "otf_run.hpp"
 
@@ -230,8 +230,8 @@ TEST(Gate, NotesARimThatIsLostAndRefusesMore) {
 /// V_x = c3 P3(u) over a slab 2 mm thick, tilted so that no node of a grid over its box lies
 /// inside.
 VolumetricModel thin_slab(double c3_m) {
-  const evemu::ReadingBox box{Vector3::Zero(), Vector3(0.3, 0.3, 0.3)};
-  const auto design = *evemu::ScaledDesign::of(*KinematicChain::parse("[w b X Y Z t]"), 3, box);
+  const ReadingBox box{Vector3::Zero(), Vector3(0.3, 0.3, 0.3)};
+  const auto design = *ScaledDesign::of(*KinematicChain::parse("[w b X Y Z t]"), 3, box);
   const auto size = static_cast<Eigen::Index>(design.size());
   Eigen::VectorXd c = Eigen::VectorXd::Zero(size);
   const auto& names = design.equivalent().names();
@@ -247,7 +247,7 @@ VolumetricModel thin_slab(double c3_m) {
   }
 
   return *VolumetricModel::from_polynomials(
-      *evemu::EvemuModel::of(design, Vector3::Zero(), c, Eigen::MatrixXd::Zero(size, size)),
+      *PolynomialModel::of(design, Vector3::Zero(), c, Eigen::MatrixXd::Zero(size, size)),
       Gauge::Ball1, Vector3::Zero(), *ValidityVolume::hull_of(corners));
 }
 

@@ -1,4 +1,4 @@
-#include "abbe/calib/gauge.hpp"
+#include "abbe/calib/model/gauge.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <functional>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "otf_run.hpp"
 
 namespace {

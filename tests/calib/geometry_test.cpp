@@ -1,4 +1,4 @@
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <random>
 
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 
 namespace abbe::tests::held {
 namespace {
@@ -127,10 +127,10 @@ TEST(HeldCorrection, BacklashIsInTheTableOfItsAxis) {
   auto description = random_model(is_translation).description();
   const auto layout =
       ParameterLayout::observable_with_one_target(description.chain, description.nodes).value();
-  const auto kind = estimation::TravelDependence::Backlash;
-  estimation::TableOptions options;
+  const auto kind = TravelDependence::Backlash;
+  TableOptions options;
   options.travel = kind;
-  const auto basis = estimation::TableBasis::of(layout, options).value();
+  const auto basis = TableBasis::of(layout, options).value();
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   const auto m = static_cast<Eigen::Index>(basis.size()) - n;
   Eigen::VectorXd D = Eigen::VectorXd::Zero(m);

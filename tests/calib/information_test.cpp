@@ -6,9 +6,9 @@
 #include <cmath>
 #include <random>
 
-#include "abbe/calib/estimation/dense_information.hpp"
-#include "abbe/calib/estimation/null_space.hpp"
-#include "abbe/calib/estimation/sparse_information.hpp"
+#include "abbe/calib/internal/estimation/dense_information.hpp"
+#include "abbe/calib/internal/estimation/null_space.hpp"
+#include "abbe/calib/internal/estimation/sparse_information.hpp"
 
 namespace {
 using namespace abbe::calib;

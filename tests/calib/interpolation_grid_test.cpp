@@ -1,4 +1,4 @@
-#include "abbe/calib/interpolation_grid.hpp"
+#include "abbe/calib/model/interpolation_grid.hpp"
 
 #include <gtest/gtest.h>
 

@@ -11,8 +11,6 @@
 
 namespace {
 using namespace abbe::calib;
-using estimation::AxisTravel;
-using estimation::Travel;
 
 constexpr double kIsoU_m = 0.1e-6;
 const Vector3 kIsoTool(0.02, -0.015, -0.12);
@@ -106,8 +104,8 @@ TEST(StandardValues, StraightnessIsRelativeToTheLeastSquaresLine) {
   EXPECT_NEAR(s.range.value, 4e-6, 1e-15);
   EXPECT_NEAR(s.deviation[1].value, -0.5e-6, 1e-15);
   EXPECT_NEAR(straightness_named(values_of(model), "EZX").range.value, 0.0, 1e-15);
-  // Deviation 1 of five independent values at p = -2 .. 2, with the weights w = (1, 2, 2, 2, 1) / 8 of
-  // the mean and (M p) / (p M p) = (-5/6, -1, 0, 1, 5/6) / (16/3) of the slope.
+  // Deviation 1 of five independent values at p = -2 .. 2, with the weights w = (1, 2, 2, 2, 1) / 8
+  // of the mean and (M p) / (p M p) = (-5/6, -1, 0, 1, 5/6) / (16/3) of the slope.
   const std::array slope{-5.0 / 6.0, -1.0, 0.0, 1.0, 5.0 / 6.0};
   double variance = 0.0;
   for (std::size_t i = 0; i < 5; ++i) {
@@ -216,8 +214,8 @@ VolumetricModel with_backlash(double D, double u_D) {
   ModelDescription d = iso_zero_model();
   set_table(d, "EXX", [](double x) { return 10e-6 * x * x; });
   const auto layout = ParameterLayout::observable_with_one_target(d.chain, d.nodes).value();
-  const auto kind = estimation::TravelDependence::Backlash;
-  const auto basis = estimation::TableBasis::of(layout, {.travel = kind}).value();
+  const auto kind = TravelDependence::Backlash;
+  const auto basis = TableBasis::of(layout, {.travel = kind}).value();
   const auto n = static_cast<Eigen::Index>(layout.model_size()),
              m = static_cast<Eigen::Index>(basis.size()) - n;
   TravelDifferences travel{kind, Eigen::VectorXd::Zero(m),
@@ -279,20 +277,20 @@ TEST(StandardValues, AreThoseOfVForTablesAndPolynomials) {
     p.value = 1e-5 * normal(random);
   }
   expect_values_of_V(VolumetricModel::from_description(tables).value());
-  tables.interpolation = estimation::Interpolation::NaturalCubic;
+  tables.interpolation = Interpolation::NaturalCubic;
   expect_values_of_V(VolumetricModel::from_description(tables).value());
 
   const auto volume =
       ValidityVolume::hull_of(iso_corners({-0.3, -0.2, -0.4}, {0.3, 0.2, -0.1})).value();
-  const auto design = evemu::ScaledDesign::of({}, 3, {{0.0, 0.0, -0.25}, {0.3, 0.2, 0.15}}).value();
+  const auto design = ScaledDesign::of({}, 3, {{0.0, 0.0, -0.25}, {0.3, 0.2, 0.15}}).value();
   const auto n = static_cast<Eigen::Index>(design.size());
   Eigen::VectorXd c(n);
   for (double& value : c) {
     value = 1e-5 * normal(random);
   }
   const auto polynomials =
-      evemu::EvemuModel::of(design, Vector3::Zero(), c,
-                            kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
+      PolynomialModel::of(design, Vector3::Zero(), c,
+                                 kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
           .value();
   const auto model =
       VolumetricModel::from_polynomials(polynomials, Gauge::Ball1, kIsoTool, volume).value();
@@ -368,9 +366,9 @@ TEST(StandardValues, UOfARangeHoldsTheTrueRange) {
   }
 }
 
-/// Models in which the node of EXX at 0 has a standard uncertainty of 20 um, and its neighbours +-10.5
-/// and +-21 um; the node is truly anywhere (40 um). Part of the runs in which value -+ 2 u holds the
-/// range, and the largest error in units of u.
+/// Models in which the node of EXX at 0 has a standard uncertainty of 20 um, and its neighbours
+/// +-10.5 and +-21 um; the node is truly anywhere (40 um). Part of the runs in which value -+ 2 u
+/// holds the range, and the largest error in units of u.
 TEST(StandardValues, UOfARangeCoversNodesThatAreNotItsExtremes) {
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
@@ -400,14 +398,14 @@ TEST(StandardValues, UOfARangeCoversNodesThatAreNotItsExtremes) {
   }
   std::cout << held << " of " << kRuns << " held, largest error " << worst
             << " u, mean squared normalised error " << squares / kRuns << "\n";
-  // 95 to 97 %, with a standard deviation of 1.2 %; 0.6 to 0.9. With the two extremes of the estimate
-  // alone 92 %, 1.0 to 2.4, and errors of 5 to 9 u.
+  // 95 to 97 %, with a standard deviation of 1.2 %; 0.6 to 0.9. With the two extremes of the
+  // estimate alone 92 %, 1.0 to 2.4, and errors of 5 to 9 u.
   EXPECT_GE(held, 0.93 * kRuns);
   EXPECT_LE(squares / kRuns, 0.95);
 }
 
-/// A node of 20 um between two that are the extremes of the estimate, +-21 um: the true range is larger
-/// in a third of the cases, by some 10 um rms over all. The mean of that alone is 5 um.
+/// A node of 20 um between two that are the extremes of the estimate, +-21 um: the true range is
+/// larger in a third of the cases, by some 10 um rms over all. The mean of that alone is 5 um.
 TEST(StandardValues, ABadlyKnownNodeIsInUOfTheRange) {
   ModelDescription model = iso_zero_model();
   set_table(model, "EXX", [](double x) { return 70e-6 * x; });
@@ -445,8 +443,7 @@ TEST(StandardValues, MOfADiagonalIsThatOfAllItsPositions) {
     p.value =
         (p.name[1] == 'X' || p.name[1] == 'Y' || p.name[1] == 'Z' ? 1e-6 : 30e-6) * normal(random);
   }
-  for (const auto kind :
-       {estimation::Interpolation::Linear, estimation::Interpolation::NaturalCubic}) {
+  for (const auto kind : {Interpolation::Linear, Interpolation::NaturalCubic}) {
     tables.interpolation = kind;
     const auto model = VolumetricModel::from_description(tables).value();
     const auto values = iso::standard_values(model).value();
@@ -454,7 +451,7 @@ TEST(StandardValues, MOfADiagonalIsThatOfAllItsPositions) {
       const double wanted_m = range_of_V_along(model, d);
       // an extreme at a node is between two of the 40000 places
       EXPECT_NEAR(d.M.value, wanted_m, 1e-4 * wanted_m) << d.name;
-      if (kind == estimation::Interpolation::Linear) {
+      if (kind == Interpolation::Linear) {
         EXPECT_GE(d.M.value, (1.0 - 1e-9) * wanted_m) << d.name;
       }
     }
@@ -494,8 +491,8 @@ TEST(StandardValues, EContainsTheUncertaintyOfAReversalErrorOfZero) {
 TEST(StandardValues, TheLargestReversalErrorContainsItsExcess) {
   const VolumetricModel one = with_backlash(0.0, 1e-6);
   const iso::Value B = *iso::standard_values(one)->positioning[0].B;
-  // One difference for the whole axis: |B| is |D| with D of N(0, 1 um), of mean sqrt(2 / pi) um. The
-  // mean of 128 |D| has a standard deviation of 0.05 um; rotations add a little.
+  // One difference for the whole axis: |B| is |D| with D of N(0, 1 um), of mean sqrt(2 / pi) um.
+  // The mean of 128 |D| has a standard deviation of 0.05 um; rotations add a little.
   EXPECT_NEAR(B.u, std::hypot(1e-6, std::sqrt(2.0 / M_PI) * 1e-6), 0.11e-6);
 }
 
@@ -516,11 +513,11 @@ TEST(StandardValues, AFlatCurveHasAnUncertainty) {
   EXPECT_GT(volume->largest.u, 2.0 * kIsoU_m);
 }
 
-/// V_y = c P3(x / 0.3 m) of a ball array: its range is 2 c, and the part that is no line is measured
-/// between the nodes, where its largest values are.
+/// V_y = c P3(x / 0.3 m) of a ball array: its range is 2 c, and the part that is no line is
+/// measured between the nodes, where its largest values are.
 TEST(StandardValues, StraightnessOfAPolynomialIsThatOfItsCurve) {
-  const evemu::ReadingBox box{{0.0, 0.0, -0.25}, {0.3, 0.2, 0.15}};
-  const auto design = evemu::ScaledDesign::of({}, 3, box).value();
+  const ReadingBox box{{0.0, 0.0, -0.25}, {0.3, 0.2, 0.15}};
+  const auto design = ScaledDesign::of({}, 3, box).value();
   const auto n = static_cast<Eigen::Index>(design.size());
   const auto volume =
       ValidityVolume::hull_of(iso_corners({-0.3, -0.2, -0.4}, {0.3, 0.2, -0.1})).value();
@@ -536,12 +533,13 @@ TEST(StandardValues, StraightnessOfAPolynomialIsThatOfItsCurve) {
   const Eigen::VectorXd c = rows.completeOrthogonalDecomposition().solve(wanted);
   ASSERT_LT((rows * c - wanted).norm(), 1e-12) << "the polynomials contain P3";
 
-  const auto model = VolumetricModel::from_polynomials(
-                         evemu::EvemuModel::of(design, Vector3::Zero(), c,
-                                               kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
-                             .value(),
-                         Gauge::Ball1, kIsoTool, volume)
-                         .value();
+  const auto model =
+      VolumetricModel::from_polynomials(
+          PolynomialModel::of(design, Vector3::Zero(), c,
+                                     kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
+              .value(),
+          Gauge::Ball1, kIsoTool, volume)
+          .value();
   // P3 has no part of a line: the reference line is 0.
   const auto values = iso::standard_values(model).value();
   EXPECT_NEAR(straightness_named(values, "EYX").range.value, 20e-6, 0.2e-6);

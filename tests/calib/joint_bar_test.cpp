@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "abbe/calib/joint/contribution.hpp"
-#include "abbe/calib/mfb/solve.hpp"
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/lack_of_fit.hpp"
+#include "abbe/calib/mfb/solve/solve.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/judge/lack_of_fit.hpp"
 #include "joint_triple.hpp"
 
 namespace {
@@ -23,7 +23,7 @@ using testing::SizeIs;
 using testing::StartsWith;
 
 joint::CommonTables common_of(const TripleMachine& m) {
-  return {*abbe::calib::estimation::TableBasis::of(abbe::tests::otf::layout_of(m.run.machine)),
+  return {*abbe::calib::TableBasis::of(abbe::tests::otf::layout_of(m.run.machine)),
           m.run.machine.target_offset_m};
 }
 
@@ -120,8 +120,8 @@ TEST(JointBar, HasTheErrorsOfExpansionAndThermometerAsEffects) {
   EXPECT_EQ(part->effects[effects - 2], "expansion of bar.toml");
   EXPECT_EQ(part->effects[effects - 1], "thermometer of bar.toml");
   EXPECT_NEAR(part->u_of_effects[effects - 1], 11e-6 * 0.2, 1e-15);
-  // One K for each u of the expansion, u of the temperature for that of the thermometer: both lengthen
-  // the bar.
+  // One K for each u of the expansion, u of the temperature for that of the thermometer: both
+  // lengthen the bar.
   const auto squared = [&](std::size_t effect) {
     return part->information.squared_length(common.basis.size() + effect);
   };
@@ -134,7 +134,7 @@ TEST(JointBar, RefusesObservationsOnOtherNodes) {
   const TripleMachine m = triple_machine(1);
   joint::CommonTables common = common_of(m);
   const auto observed = triple_bar(m, common, abbe::tests::mfb::paper_plan());
-  common.basis = *abbe::calib::estimation::TableBasis::of(
+  common.basis = *abbe::calib::TableBasis::of(
       abbe::tests::otf::layout_of(abbe::tests::otf::coarse_machine("[w X' b Y Z (C1) t]")));
   const auto part = joint::part_of_bar("bar", observed, common);
   ASSERT_FALSE(part);

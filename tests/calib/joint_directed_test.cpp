@@ -6,9 +6,9 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "axis_scale_columns.hpp"
-#include "gauge_coordinates.hpp"
-#include "joint/all_parts.hpp"
+#include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
+#include "abbe/calib/internal/joint/all_parts.hpp"
+#include "abbe/calib/internal/model/gauge_coordinates.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -26,7 +26,7 @@ using testing::StartsWith;
 class DirectedTests : public testing::Test {
  protected:
   DirectedTests()
-      : common_{*abbe::calib::estimation::TableBasis::of(abbe::tests::otf::layout_of(
+      : common_{*abbe::calib::TableBasis::of(abbe::tests::otf::layout_of(
                     abbe::tests::otf::coarse_machine("[w X' b Y Z t]"))),
                 abbe::calib::Vector3::Zero()},
         c_(abbe::calib::gauge_coordinates(common_.basis)),

@@ -3,20 +3,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "abbe/calib/internal/model/gauge_coordinates.hpp"
 #include "abbe/calib/joint/identify.hpp"
-#include "gauge_coordinates.hpp"
 #include "otf_run.hpp"
 
 namespace {
 namespace joint = abbe::calib::joint;
 using abbe::calib::ErrorCode;
 using abbe::calib::Gauge;
+using abbe::calib::Interpolation;
 using abbe::calib::MachineNodes;
+using abbe::calib::TableBasis;
+using abbe::calib::TableOptions;
 using abbe::calib::Vector3;
 using abbe::calib::VolumetricModel;
-using abbe::calib::estimation::Interpolation;
-using abbe::calib::estimation::TableBasis;
-using abbe::calib::estimation::TableOptions;
 using testing::HasSubstr;
 
 const Vector3 kErrorsTool_m(0.02, -0.015, -0.12);

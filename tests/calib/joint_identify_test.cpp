@@ -3,7 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "joint_parts.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "abbe/calib/joint/contribution.hpp"
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -26,8 +26,7 @@ struct JudgedParts {
   joint::CommonTables common;
   std::vector<joint::Part> parts;
 
-  explicit JudgedParts(
-      abbe::calib::estimation::Interpolation kind = abbe::calib::estimation::Interpolation::Linear)
+  explicit JudgedParts(abbe::calib::Interpolation kind = abbe::calib::Interpolation::Linear)
       : run(make_run({.seed = 1, .interpolation = kind})),
         found(*otf::identify(run.samples, run.machine, run.path, run.noise, run.options)),
         common(*joint::tables_of(found.solution.model)) {
@@ -66,10 +65,10 @@ TEST(JointVerdict, AcceptsAModelThatPredictsLegsThatWereHeldOut) {
 }
 
 TEST(JointVerdict, KeepsTheInterpolationOfTheTables) {
-  const JudgedParts m(abbe::calib::estimation::Interpolation::NaturalCubic);
+  const JudgedParts m(abbe::calib::Interpolation::NaturalCubic);
   const auto model = joint::joint_model(m.parts, m.common);
   ASSERT_TRUE(model) << model.error().text;
-  EXPECT_EQ(model->model.interpolation(), abbe::calib::estimation::Interpolation::NaturalCubic);
+  EXPECT_EQ(model->model.interpolation(), abbe::calib::Interpolation::NaturalCubic);
   const auto verdict =
       joint::judge(*model, m.parts, m.runs(), m.common, nullptr, {}, m.run.options);
   ASSERT_TRUE(verdict) << verdict.error().text;

@@ -6,23 +6,23 @@
 
 #include <random>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "axis_scale_columns.hpp"
-#include "chi2_tail.hpp"
-#include "gauge_coordinates.hpp"
-#include "joint/left_out_rotations.hpp"
-#include "joint/pair_problem.hpp"
+#include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
+#include "abbe/calib/internal/joint/left_out_rotations.hpp"
+#include "abbe/calib/internal/joint/pair_problem.hpp"
+#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/statistics/chi2_tail.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "joint_parts.hpp"
 
 namespace {
 namespace joint = abbe::calib::joint;
 using abbe::calib::Axis;
 using abbe::calib::index;
+using abbe::calib::Interpolation;
+using abbe::calib::TableBasis;
+using abbe::calib::TableOptions;
 using abbe::calib::Vector3;
 using abbe::calib::VolumetricModel;
-using abbe::calib::estimation::Interpolation;
-using abbe::calib::estimation::TableBasis;
-using abbe::calib::estimation::TableOptions;
 using testing::HasSubstr;
 using testing::SizeIs;
 

@@ -1,4 +1,4 @@
-#include "joint/pair_problem.hpp"
+#include "abbe/calib/internal/joint/pair_problem.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "chi2_tail.hpp"
+#include "abbe/calib/internal/statistics/chi2_tail.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -28,8 +28,7 @@ struct Estimate {
 class PairProblem : public testing::Test {
  protected:
   PairProblem()
-      : basis_(
-            *abbe::calib::estimation::TableBasis::of(layout_of(coarse_machine("[w X' b Y Z t]")))),
+      : basis_(*abbe::calib::TableBasis::of(layout_of(coarse_machine("[w X' b Y Z t]")))),
         c_(abbe::calib::gauge_coordinates(basis_)),
         m_(c_.N.cols()) {}
 
@@ -71,7 +70,7 @@ class PairProblem : public testing::Test {
 
   std::mt19937_64 random_{11};
   std::normal_distribution<double> normal_;
-  abbe::calib::estimation::TableBasis basis_;
+  abbe::calib::TableBasis basis_;
   GaugeCoordinates c_;
   Eigen::Index m_ = 0;
 };

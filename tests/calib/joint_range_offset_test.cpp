@@ -1,5 +1,5 @@
 /// Runs of one tracker with one offset of its ranges, in a joint identification (joint/part.hpp,
-/// SharedRangeOffset) and in updates of a model (model_update.hpp).
+/// TrackerPlace) and in updates of a model (model_update.hpp).
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_update.hpp"
+#include "abbe/calib/model/model_update.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -43,7 +43,7 @@ joint::Part part_of(const std::string& name, const otf::Solution& solution,
                     const joint::CommonTables& common, const std::string& offset) {
   joint::CommonEffects effects;
   if (!offset.empty()) {
-    effects.range_offset = joint::SharedRangeOffset{offset, *solution.offset_in_model};
+    effects.place = TrackerPlace{offset, *solution.offset_in_model};
   }
   return *joint::part_of_run(name, solution.model, common, effects);
 }
@@ -143,8 +143,8 @@ TEST(SharedRangeOffset, NeedsAnEstimateOfTheRun) {
   const otf::Solution solution = solution_of(run);
   EXPECT_FALSE(solution.offset_in_model);
   const joint::CommonTables common = *joint::tables_of(solution.model);
-  const auto part = joint::part_of_run("run", solution.model, common,
-                                       {.range_offset = joint::SharedRangeOffset{"home 1", {}}});
+  const auto part =
+      joint::part_of_run("run", solution.model, common, {.place = TrackerPlace{"home 1", {}}});
   ASSERT_FALSE(part);
   EXPECT_THAT(part.error().text, HasSubstr("run has no estimate of the range offset 'home 1'"));
 }
@@ -225,7 +225,7 @@ TEST(RangeOffsetOfUpdates, OfAnotherPlaceIsNotTheSame) {
 /// Backlash adds unknowns that are no parameters of the model.
 TEST(RangeOffsetOfUpdates, HasOneDerivativeForEachParameterWithBacklash) {
   MadeRun run = run_with_offset(30e-6, 1);
-  run.options.backlash = abbe::calib::estimation::TravelDependence::Backlash;
+  run.options.backlash = abbe::calib::TravelDependence::Backlash;
   const otf::Solution solution = solution_of(run);
   ASSERT_TRUE(solution.offset_in_model);
   EXPECT_EQ(solution.offset_in_model->dU_dd.size(), solution.model.U().size());

@@ -1,4 +1,4 @@
-#include "abbe/calib/kinematic_chain.hpp"
+#include "abbe/calib/geometry/kinematic_chain.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "abbe/calib/evemu/linear_gaussian.hpp"
+#include "abbe/calib/evemu/solve/linear_gaussian.hpp"
 
 #include <gtest/gtest.h>
 

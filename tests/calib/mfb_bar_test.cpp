@@ -5,9 +5,9 @@
 #include <map>
 #include <sstream>
 
-#include "abbe/calib/mfb/orientation.hpp"
-#include "abbe/calib/mfb/points_of_interest.hpp"
-#include "abbe/calib/mfb/reversal.hpp"
+#include "abbe/calib/internal/mfb/identify/reversal.hpp"
+#include "abbe/calib/internal/mfb/run/orientation.hpp"
+#include "abbe/calib/mfb/run/points_of_interest.hpp"
 #include "mfb_reference.hpp"
 
 namespace {

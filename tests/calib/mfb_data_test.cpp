@@ -5,7 +5,7 @@
 #include <optional>
 #include <random>
 
-#include "abbe/calib/mfb/plan_prediction.hpp"
+#include "abbe/calib/mfb/plan/plan_prediction.hpp"
 #include "mfb_simulation.hpp"
 
 namespace {

@@ -92,7 +92,7 @@ TEST(MfbIdentify, FindsTheErrorsWithoutNoise) {
   EXPECT_LT(a.translation_um, 0.02);  // errors between the nodes, and what the rows neglect
   EXPECT_LT(a.rotation_urad, 0.05);
   EXPECT_TRUE(found->set_aside.empty());
-  EXPECT_EQ(found->model.interpolation(), estimation::Interpolation::NotAKnotCubic);
+  EXPECT_EQ(found->model.interpolation(), Interpolation::NotAKnotCubic);
 }
 
 TEST(MfbIdentify, StatesItsUncertainty) {

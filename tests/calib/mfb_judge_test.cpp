@@ -1,6 +1,6 @@
 /// The judgement of an identification with a Multi-Feature Bar, on a simulated machine.
 
-#include "abbe/calib/mfb/judge.hpp"
+#include "abbe/calib/mfb/judge/judge.hpp"
 
 #include <gmock/gmock.h>
 
@@ -164,7 +164,9 @@ TEST(MfbJudge, AsksByNameForABarThatIsFarFrom20C) {
   const auto at = [](double temperature_C) {
     Identification found = usual_identification();
     found.observations.bar.expansion = Expansivity{11.5e-6, 0.2e-6};
-    found.observations.passes.back().temperature_K = temperature_C + 273.15;
+    for (PassObservation& pass : found.observations.passes) {
+      pass.temperature_K = temperature_C + 273.15;
+    }
     return found;
   };
   for (const double temperature_C : {68.9, 35.0, 45.0, -4.0}) {
@@ -179,6 +181,31 @@ TEST(MfbJudge, AsksByNameForABarThatIsFarFrom20C) {
   }
   EXPECT_TRUE(judge(at(31.0), nullptr)->accepted);
   EXPECT_TRUE(judge(at(9.0), nullptr)->accepted);
+}
+
+// With the fewest positions no residual shows that the bar was warmer at one of them.
+TEST(MfbJudge, AsksByNameForABarThatWasWarmerAtOnePosition) {
+  const auto with = [](double by_K, double slope_K) {
+    Identification found = usual_identification();
+    found.observations.bar.expansion = Expansivity{11.5e-6, 0.2e-6};
+    auto& passes = found.observations.passes;
+    for (std::size_t i = 0; i < passes.size(); ++i) {
+      passes[i].temperature_K += slope_K * static_cast<double>(passes[i].position);
+      passes[i].temperature_K += passes[i].position == passes[3].position ? by_K : 0.0;
+    }
+    return found;
+  };
+  for (const double by_K : {2.0, -2.0, 6.0}) {
+    const Identification found = with(by_K, 0.1);
+    const auto verdict = judge(found, nullptr).value();
+    EXPECT_THAT(verdict.causes, Contains(std::string(kBarTemperature)));
+    EXPECT_THAT(verdict.reasons,
+                Contains(HasSubstr(" K from that of the positions before and after it: its "
+                                   "lengths change by ")));
+    EXPECT_TRUE(judge(found, nullptr, {.accept_bar_temperature = true})->accepted);
+  }
+  EXPECT_TRUE(judge(with(0.5, 0.0), nullptr)->accepted);
+  EXPECT_TRUE(judge(with(0.0, 0.5), nullptr)->accepted) << "a bar that warms up";
 }
 
 // Far from 20 C the uncertain expansion leaves no scale determined; further positions do not help.

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "abbe/calib/mfb/plan_indexing.hpp"
+#include "abbe/calib/mfb/plan/plan_indexing.hpp"
 #include "mfb_planning.hpp"
 
 namespace abbe::calib::mfb {

@@ -5,10 +5,10 @@
 #include <map>
 #include <random>
 
-#include "abbe/calib/mfb/monte_carlo.hpp"
-#include "abbe/calib/mfb/plan_prediction.hpp"
-#include "mfb/pass_touches.hpp"
-#include "mfb/quick_extraction.hpp"
+#include "abbe/calib/internal/mfb/observe/pass_touches.hpp"
+#include "abbe/calib/internal/mfb/observe/quick_extraction.hpp"
+#include "abbe/calib/mfb/identify/monte_carlo.hpp"
+#include "abbe/calib/mfb/plan/plan_prediction.hpp"
 #include "mfb_simulation.hpp"
 
 namespace {

@@ -1,4 +1,4 @@
-#include "abbe/calib/mfb/reading_mistakes.hpp"
+#include "abbe/calib/mfb/observe/reading_mistakes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <random>
 #include <string>
 
-#include "abbe/calib/mfb/points_of_interest.hpp"
+#include "abbe/calib/mfb/run/points_of_interest.hpp"
 #include "mfb_simulation.hpp"
 
 namespace {
@@ -125,13 +125,13 @@ Eigen::VectorXd constant_errors(const ParameterLayout& layout,
   return U;
 }
 
-estimation::TableBasis paper_basis() {
+TableBasis paper_basis() {
   const MfbMachine machine = paper_machine();
-  return *estimation::TableBasis::of(*ParameterLayout::all_tables(machine.chain, machine.nodes),
-                                     estimation::TableOptions::all_axes(machine.interpolation));
+  return *TableBasis::of(*ParameterLayout::all_tables(machine.chain, machine.nodes),
+                                TableOptions::all_axes(machine.interpolation));
 }
 
-Vector3 V_of(const estimation::TableBasis& basis, const Eigen::VectorXd& U, const Vector3& q_m,
+Vector3 V_of(const TableBasis& basis, const Eigen::VectorXd& U, const Vector3& q_m,
              const Vector3& tool_m) {
   return basis.V_m({.q_m = q_m, .tool_offset_m = tool_m},
                    {U.data(), static_cast<std::size_t>(U.size())});
@@ -141,7 +141,7 @@ TEST(MfbErrorModel, IsMinusTheDeviationOfEquations10To12) {
   constexpr double kRounding_m = 1e-15;  // 1e-12 mm
   const json rows = reference("htm_reference.json").at("rows");
   EXPECT_EQ(rows.size(), 40u);
-  const estimation::TableBasis basis = paper_basis();
+  const TableBasis basis = paper_basis();
   for (const json& row : rows) {
     const Eigen::VectorXd U = constant_errors(basis.layout(), [&](const std::string& error) {
       const double value = row.at("E").at(error);
@@ -157,7 +157,7 @@ TEST(MfbErrorModel, NeglectsLessThanTenNanometresOfEquation8) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> travel(0.0, 0.55);
   const SimulatedMachine machine(random, 0.5);  // rotations up to 50 urad, as in the paper
-  const estimation::TableBasis basis = paper_basis();
+  const TableBasis basis = paper_basis();
   double largest_m = 0.0;
   for (int i = 0; i < 200; ++i) {
     const Vector3 tool_m = 0.1 * Vector3(i % 3 - 1, (i / 3) % 3 - 1, -1.5);

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/mfb/touch_guide.hpp"
+#include "abbe/calib/mfb/live/touch_guide.hpp"
 #include "mfb_simulation.hpp"
 
 namespace {

@@ -1,10 +1,10 @@
-#include "abbe/calib/estimation/model_basis.hpp"
+#include "abbe/calib/internal/geometry/model_basis.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -183,7 +183,7 @@ TEST(ModelBasis, AnAxisThatHasNotMovedHasTheMeanOfBothDirections) {
 }
 
 TEST(ModelBasis, OfPolynomialsHasTheColumnsOfTheScaledDesign) {
-  const auto design = evemu::ScaledDesign::of(*KinematicChain::parse("[w b Z X Y t]"), 3,
+  const auto design = ScaledDesign::of(*KinematicChain::parse("[w b Z X Y t]"), 3,
                                               {{0.1, -0.2, 0.05}, {0.3, 0.2, 0.1}});
   const ModelBasis basis{PolynomialBasis(*design)};
   const MachineState state{.q_m = {0.21, -0.13, 0.02}};

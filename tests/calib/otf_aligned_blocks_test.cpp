@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/aligned_blocks.hpp"
+#include "abbe/calib/internal/otf/observe/aligned_blocks.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <functional>
 #include <string>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 #include "stream_faults.hpp"
 

@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/alignment.hpp"
+#include "abbe/calib/otf/observe/alignment.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/internal/otf/samples/reading_jumps.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "encoder_run.hpp"
-#include "otf/reading_jumps.hpp"
 
 namespace {
 using namespace abbe::calib;

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <string>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace {

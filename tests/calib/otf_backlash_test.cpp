@@ -1,5 +1,5 @@
 // Backlash as unknowns of on-the-fly calibration: simulated runs, and case C of the reference data.
-#include "abbe/calib/otf/backlash.hpp"
+#include "abbe/calib/otf/solve/backlash.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,10 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/targets.hpp"
+#include "abbe/calib/internal/otf/identify/observe_run.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/identify/targets.hpp"
 #include "backlash_run.hpp"
 #include "encoder_run.hpp"
 #include "standstill_run.hpp"
@@ -18,8 +19,6 @@ namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
-using estimation::Travel;
-using estimation::TravelDependence;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -358,8 +357,8 @@ TEST_P(CaseC, HasTheErrorOfThePrototypeAndEveryBacklash) {
   }
 }
 
-/// ref.json, cases.C.ignored.mae: 5.949 um with rows of independent noise. Prewhitening (Joint) takes
-/// a part of the backlash for correlated noise.
+/// ref.json, cases.C.ignored.mae: 5.949 um with rows of independent noise. Prewhitening (Joint)
+/// takes a part of the backlash for correlated noise.
 TEST_P(CaseC, IsWrongByMicrometresWithoutBacklash) {
   const auto id = identified(TravelDependence::None);
   ASSERT_TRUE(id) << id.error().text;

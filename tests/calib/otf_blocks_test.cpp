@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,17 +5,16 @@
 #include <cmath>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/model_drift.hpp"
-#include "abbe/calib/model_update.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/model/model_drift.hpp"
+#include "abbe/calib/model/model_update.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
-using estimation::Interpolation;
 
 Result<Identification> identified_cubic(const MadeRun& run) {
   return identify(run.samples, run.machine, run.path, run.noise, run.options);

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "abbe/calib/model_drift.hpp"
+#include "abbe/calib/model/model_drift.hpp"
 #include "drift_models.hpp"
 
 namespace {

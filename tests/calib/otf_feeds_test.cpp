@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "abbe/calib/verify/compare.hpp"
 #include "standstill_run.hpp"
 

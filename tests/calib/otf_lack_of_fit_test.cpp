@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/lack_of_fit.hpp"
+#include "abbe/calib/otf/judge/lack_of_fit.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <functional>
 #include <string>
 
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/judge.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
 #include "otf_run.hpp"
 
 namespace {

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "abbe/calib/joint/identify.hpp"
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/model_update.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/judge.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/model/model_update.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
 #include "otf_run.hpp"
 
 namespace {

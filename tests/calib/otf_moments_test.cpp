@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "abbe/calib/otf/moments.hpp"
-#include "abbe/calib/otf/solve.hpp"
+#include "abbe/calib/otf/live/moments.hpp"
+#include "abbe/calib/otf/solve/solve.hpp"
 #include "allocation_count.hpp"
 #include "otf_run.hpp"
 
@@ -14,11 +14,11 @@ using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 
-estimation::TableBasis moment_basis(const Machine& machine, estimation::TableOptions options = {}) {
-  return *estimation::TableBasis::of(layout_of(machine), options);
+TableBasis moment_basis(const Machine& machine, TableOptions options = {}) {
+  return *TableBasis::of(layout_of(machine), options);
 }
 
-MomentAccumulator moments_of(const Machine& machine, estimation::TableOptions options = {}) {
+MomentAccumulator moments_of(const Machine& machine, TableOptions options = {}) {
   return *MomentAccumulator::of(
       {moment_basis(machine, options), machine.target_offset_m, case_a_alignment(true), Noise{}});
 }
@@ -167,8 +167,7 @@ TEST(Moments, IgnoreSamplesNearTheEndsOfALegAndBeforeTheFirstLeg) {
 /// A table for each direction of travel: a leg driven in both directions determines the difference.
 TEST(Moments, KnowTheDirectionOfTravel) {
   const Machine machine = coarse_machine("[w X' b Y Z (C1) t]");
-  MomentAccumulator moments =
-      moments_of(machine, {.travel = estimation::TravelDependence::Backlash});
+  MomentAccumulator moments = moments_of(machine, {.travel = TravelDependence::Backlash});
   const auto& [from, to] = kLegs[0];
   const auto samples = samples_on(from, to, machine.target_offset_m, 100);
   for (const bool forward : {true, false}) {
@@ -178,7 +177,7 @@ TEST(Moments, KnowTheDirectionOfTravel) {
     }
   }
 
-  const estimation::TableBasis basis = moment_basis(machine);
+  const TableBasis basis = moment_basis(machine);
   const Eigen::MatrixXd R = moments.information().R();
   const Eigen::MatrixXd H = R.transpose() * R;
   // EYX has a backlash with the weight of its mean table; both directions cancel the coupling.
@@ -190,9 +189,9 @@ TEST(Moments, KnowTheDirectionOfTravel) {
 
 TEST(Moments, OfCubicTablesAreRefused) {
   const auto moments = MomentAccumulator::of(
-      {moment_basis(case_a_machine(), {.interpolation = {estimation::Interpolation::Linear,
-                                                         estimation::Interpolation::NaturalCubic,
-                                                         estimation::Interpolation::Linear}}),
+      {moment_basis(case_a_machine(), {.interpolation = {Interpolation::Linear,
+                                                         Interpolation::NaturalCubic,
+                                                         Interpolation::Linear}}),
        Vector3::Zero(),
        {},
        Noise{}});

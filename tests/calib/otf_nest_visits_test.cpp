@@ -1,5 +1,5 @@
 /// Visits of reference nests in the stream of the tracker.
-#include "abbe/calib/otf/nest_visits.hpp"
+#include "abbe/calib/otf/samples/nest_visits.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/calib/otf/judge.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
 #include "nest_run.hpp"
 #include "normalised_error.hpp"
 #include "standstill_run.hpp"
@@ -27,8 +27,8 @@ using testing::UnorderedElementsAre;
 
 const Vector3 kDrift_m(16e-6, -16e-6, 16e-6);
 
-/// Two nests: translations only, which takes a tenth of the time. `scripts/bench otf_nests` runs more
-/// machines, with three nests and rotation, and case A.
+/// Two nests: translations only, which takes a tenth of the time. `scripts/bench otf_nests` runs
+/// more machines, with three nests and rotation, and case A.
 NestRunOptions two_nests(NestRunOptions wanted) {
   wanted.nests_m.resize(2);
   return wanted;
@@ -148,7 +148,8 @@ TEST(Nests, TheUncertaintyContainsARandomWalk) {
     const NestResult result = with_random_walk(seed, kDrift_m);
     normalised += normalised_error_square(result.run, result.id.solution.model) / 2.0;
     EXPECT_GT(result.drift().walk_m, 4e-6);
-    EXPECT_THAT(verdict_on(result).notes, Contains(HasSubstr("is not smooth: it contains a random")));
+    EXPECT_THAT(verdict_on(result).notes,
+                Contains(HasSubstr("is not smooth: it contains a random")));
   }
   EXPECT_LT(normalised, 1.3);
   EXPECT_GT(normalised, 0.1);

@@ -1,11 +1,12 @@
-#include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/otf/observe/observe.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/internal/otf/identify/observe_run.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -57,7 +58,7 @@ TEST(SampleCovariance, IsTheSphericalOneThroughItsJacobian) {
 /// A block that crosses a node: its row is the mean of the rows, not the row of the mean.
 TEST(DesignRows, AreAveragedOverTheBlock) {
   const Machine machine = case_a_machine();
-  Observations o{.basis = *estimation::TableBasis::of(layout_of(machine)),
+  Observations o{.basis = *TableBasis::of(layout_of(machine)),
                  .target_offset_m = machine.target_offset_m};
   const std::vector<Vector3> sub{
       {0.045, 0.1, -0.1}, {0.049, 0.1, -0.1}, {0.053, 0.1, -0.1}, {0.057, 0.1, -0.1}};

@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/judge.hpp"
-#include "abbe/calib/otf/orientation.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
+#include "abbe/calib/otf/observe/orientation.hpp"
 #include "otf_run.hpp"
 
 namespace {

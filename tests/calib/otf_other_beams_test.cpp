@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/other_beams.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/solve/other_beams.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -47,8 +47,8 @@ TEST(OtherBeams, OfMachineCoordinatesIsContradictedAndTheTrackerIsFound) {
   }
 }
 
-/// Noise that is alike in all directions, or that the machine makes in one of them, states nothing of
-/// the beams.
+/// Noise that is alike in all directions, or that the machine makes in one of them, states nothing
+/// of the beams.
 TEST(OtherBeams, IsNotFoundInOtherNoise) {
   for (const Vector3& vibration_m : {Vector3(10e-6, 10e-6, 10e-6), Vector3(0.0, 15e-6, 0.0)}) {
     MadeRun run = make_run({.noise_factor = 0.1, .rate_hz = 500.0});

@@ -1,11 +1,11 @@
-#include "abbe/calib/otf/placed_residuals.hpp"
+#include "abbe/calib/otf/judge/placed_residuals.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "otf_run.hpp"
 
 namespace {

@@ -5,16 +5,15 @@
 #include <algorithm>
 #include <utility>
 
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/plan.hpp"
-#include "abbe/calib/otf/plan_observable.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
+#include "abbe/calib/otf/plan/plan_observable.hpp"
 #include "otf_run.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
-using estimation::TravelDependence;
 using testing::AllOf;
 using testing::HasSubstr;
 

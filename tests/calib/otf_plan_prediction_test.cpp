@@ -1,5 +1,5 @@
 /// Prediction of a run, against the figures of the prototype (ref.json) and against a run.
-#include "abbe/calib/otf/plan_prediction.hpp"
+#include "abbe/calib/otf/plan/plan_prediction.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/plan.hpp"
-#include "abbe/calib/otf/plan_observable.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
+#include "abbe/calib/otf/plan/plan_observable.hpp"
 #include "otf_run.hpp"
 
 namespace {

@@ -1,14 +1,14 @@
 /// Planned paths, for a machine with few nodes; `scripts/bench plan_otf` plans for the reference
 /// machine.
-#include "abbe/calib/otf/plan.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "abbe/calib/otf/plan_observable.hpp"
-#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/calib/otf/plan/plan_observable.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
 #include "otf_run.hpp"
 
 namespace {

@@ -1,11 +1,11 @@
-#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 
 namespace {
 using namespace abbe::calib;

@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/prewhitening.hpp"
+#include "abbe/calib/internal/otf/solve/prewhitening.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <random>
 #include <vector>
 
-#include "abbe/calib/gauge.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "gauge_coordinates.hpp"
-#include "otf/row_residuals.hpp"
+#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/otf/observe/row_residuals.hpp"
+#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -225,7 +225,8 @@ TEST(Prewhitening, LeavesNoCorrelationToWiden) {
   EXPECT_LT(s.variance_factor, 1.3 * s.chi2_per_dof);
 }
 
-/// e^T C^-1 e / n of the errors e of the parameters in the n coordinates that the gauge leaves free.
+/// e^T C^-1 e / n of the errors e of the parameters in the n coordinates that the gauge leaves
+/// free.
 double normalised_squared_error(const MadeRun& run, const Identification& id) {
   Eigen::VectorXd truth =
       Eigen::VectorXd::Zero(static_cast<Eigen::Index>(id.observations.unknowns()));

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "abbe/calib/otf/alignment.hpp"
-#include "abbe/calib/otf/standstill.hpp"
+#include "abbe/calib/internal/otf/samples/standstill.hpp"
+#include "abbe/calib/otf/observe/alignment.hpp"
 #include "otf_run.hpp"
 
 namespace {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace {

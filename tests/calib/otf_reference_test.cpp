@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/moments.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/live/moments.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -163,7 +163,7 @@ TEST(CaseAInformation, OfAllSamplesHasThePrototypesNormalEquations) {
   const Machine machine = case_a_machine();
   const Path path = case_a_path();
   const RigidTransform T = case_a_alignment(true);
-  const Observations none{.basis = *estimation::TableBasis::of(layout_of(machine)),
+  const Observations none{.basis = *TableBasis::of(layout_of(machine)),
                           .target_offset_m = machine.target_offset_m};
   RowInformation all(none.unknowns());
   Observations o = none;
@@ -192,7 +192,7 @@ TEST(CaseAInformation, FromMomentsHasThePrototypesNormalEquations) {
   const std::vector<std::size_t> leg = case_a_blocks().leg;
   const Machine machine = case_a_machine();
   const Path path = case_a_path();
-  auto moments = MomentAccumulator::of({*estimation::TableBasis::of(layout_of(machine)),
+  auto moments = MomentAccumulator::of({*TableBasis::of(layout_of(machine)),
                                         machine.target_offset_m, case_a_alignment(true), Noise{}});
   ASSERT_TRUE(moments) << moments.error().text;
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "abbe/calib/gauge.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/running_estimate.hpp"
+#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/live/running_estimate.hpp"
 #include "backlash_run.hpp"
 #include "otf_run.hpp"
 
@@ -128,10 +128,10 @@ TEST(RunningEstimate, OfTheCompleteRunAgreesWithTruthAndIdentification) {
 TEST(RunningEstimate, WithBacklashIsTheMeanOfBothDirections) {
   const MadeRunOptions wanted{.speed_m_s = kRunningSpeed_m_s, .rate_hz = kRunningRate_hz};
   MadeRun run = make_backlash_run(wanted, {Eigen::VectorXd::Constant(14, 8e-6)});
-  run.options.backlash = estimation::TravelDependence::Backlash;
+  run.options.backlash = TravelDependence::Backlash;
   const std::size_t legs = run.path.vertices_m.size() - 1;
   const auto with = tables_after(run, legs);
-  run.options.backlash = estimation::TravelDependence::None;
+  run.options.backlash = TravelDependence::None;
   const auto without = tables_after(run, legs);
   ASSERT_TRUE(with && without) << with.error().text;
 

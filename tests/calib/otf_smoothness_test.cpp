@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/smoothness.hpp"
+#include "abbe/calib/otf/run/smoothness.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/internal/otf/run/about_bends.hpp"
+#include "abbe/calib/internal/otf/run/table_bends.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "normalised_error.hpp"
-#include "otf/about_bends.hpp"
-#include "otf/table_bends.hpp"
 #include "smooth_run.hpp"
 #include "standstill_run.hpp"
 

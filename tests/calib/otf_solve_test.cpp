@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/solve.hpp"
+#include "abbe/calib/otf/solve/solve.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,10 +10,11 @@
 #include <iterator>
 #include <utility>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/judge.hpp"
-#include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/internal/otf/identify/observe_run.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
+#include "abbe/calib/otf/observe/observe.hpp"
 #include "otf_run.hpp"
 
 namespace {

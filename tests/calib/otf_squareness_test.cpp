@@ -6,7 +6,7 @@
 #include <array>
 #include <string>
 
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace {

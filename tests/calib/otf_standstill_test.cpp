@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/standstill.hpp"
+#include "abbe/calib/internal/otf/samples/standstill.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "abbe/calib/otf/observe_standstills.hpp"
+#include "abbe/calib/internal/otf/standstill/observe_standstills.hpp"
 #include "standstill_run.hpp"
 
 namespace {

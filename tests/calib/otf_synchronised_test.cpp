@@ -5,9 +5,9 @@
 #include <random>
 #include <string>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/judge.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
 #include "encoder_run.hpp"
 #include "normalised_error.hpp"
 
@@ -107,8 +107,8 @@ TEST(SynchronisedEstimate, FindsTheClock) {
   }
 }
 
-/// Times since 1970, of either clock or of both, are the same times: but for steps of 0.24 us, which
-/// are 0.1 um of travel in one reading.
+/// Times since 1970, of either clock or of both, are the same times: but for steps of 0.24 us,
+/// which are 0.1 um of travel in one reading.
 TEST(SynchronisedEstimate, TakesTimesSince1970) {
   constexpr double kSince1970_s = 1.7e9;
   for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {

@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/targets.hpp"
+#include "abbe/calib/otf/identify/targets.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "nest_run.hpp"
 #include "normalised_error.hpp"
 #include "otf_run.hpp"
@@ -20,7 +20,6 @@ namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
-using estimation::Interpolation;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -34,8 +33,8 @@ struct MadeTargetsOptions {
   std::string chain = "[w X' b Y Z (C1) t]";
   Interpolation interpolation = Interpolation::Linear;
   std::vector<Vector3> targets_m = kThreeRunTargets;
-  /// Runs of some 1000 s from one place of the tracker, which drifts to the other side in the second
-  /// of them; two nests.
+  /// Runs of some 1000 s from one place of the tracker, which drifts to the other side in the
+  /// second of them; two nests.
   std::optional<NestRunOptions> nests{};
 };
 
@@ -59,9 +58,9 @@ struct MadeTargets {
   std::vector<std::vector<TrackerObservation>> samples;
   std::vector<TargetRun> runs;
 
-  [[nodiscard]] estimation::TableBasis basis() const {
-    return *estimation::TableBasis::of(*ParameterLayout::all_tables(machine.chain, machine.nodes),
-                                       estimation::TableOptions::all_axes(machine.interpolation));
+  [[nodiscard]] TableBasis basis() const {
+    return *TableBasis::of(*ParameterLayout::all_tables(machine.chain, machine.nodes),
+                                  TableOptions::all_axes(machine.interpolation));
   }
   [[nodiscard]] Vector3 V_m(const Vector3& q, const Vector3& t) const {
     return basis().V_m({.q_m = q, .tool_offset_m = t},
@@ -84,7 +83,7 @@ MadeTargets make_targets(const MadeTargetsOptions& wanted) {
   made.machine.interpolation = wanted.interpolation;
   made.options.block_samples = 10;
   made.options.orientation.scales_agree = true;
-  const estimation::TableBasis basis = made.basis();
+  const TableBasis basis = made.basis();
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(basis.size() + 6));
   const auto n = static_cast<Eigen::Index>(basis.size());
   U.head(n) = random_tables(basis.layout(), wanted.error_scale_m, random);

@@ -1,16 +1,14 @@
 // V for a direction of travel, identified on the fly: simulated machines with known backlash.
 #include <gtest/gtest.h>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "backlash_run.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
-using estimation::Travel;
-using estimation::TravelDependence;
 
 /// The eight directions of three axes.
 std::vector<AxisTravel> all_directions() {

@@ -4,7 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <numeric>
 
-#include "abbe/calib/model_update.hpp"
+#include "abbe/calib/internal/otf/identify/observe_run.hpp"
+#include "abbe/calib/model/model_update.hpp"
 #include "drift_models.hpp"
 
 namespace {
@@ -13,8 +14,8 @@ using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 using testing::HasSubstr;
 
-/// Largest eigenvalue of A - B relative to B, both scaled to the variances of B: not above 0 if A is
-/// nowhere larger.
+/// Largest eigenvalue of A - B relative to B, both scaled to the variances of B: not above 0 if A
+/// is nowhere larger.
 double largest_excess(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
   const Eigen::VectorXd scale = B.diagonal().unaryExpr(
       [](double variance) { return variance > 0.0 ? 1.0 / std::sqrt(variance) : 0.0; });

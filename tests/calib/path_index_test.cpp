@@ -1,4 +1,4 @@
-#include "abbe/calib/otf/path_index.hpp"
+#include "abbe/calib/otf/run/path_index.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 /// Size of V without rigid motion.
-#include "rigid_free_norm.hpp"
+#include "abbe/calib/internal/geometry/rigid_free_norm.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "certainty.hpp"
+#include "abbe/calib/internal/model/certainty.hpp"
 
 namespace {
 using namespace abbe::calib;

@@ -1,4 +1,4 @@
-#include "abbe/calib/sparse/cross_validation.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

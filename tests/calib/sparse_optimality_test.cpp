@@ -1,4 +1,4 @@
-#include "abbe/calib/sparse/optimality.hpp"
+#include "abbe/calib/internal/sparse/optimality.hpp"
 
 #include <gtest/gtest.h>
 

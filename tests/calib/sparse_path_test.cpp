@@ -1,4 +1,4 @@
-#include "abbe/calib/sparse/path.hpp"
+#include "abbe/calib/internal/sparse/path.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 #include <limits>
 #include <numeric>
 
-#include "abbe/calib/sparse/cross_validation.hpp"
-#include "abbe/calib/sparse/optimality.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
+#include "abbe/calib/internal/sparse/optimality.hpp"
 #include "sparse_problem.hpp"
 
 namespace {

@@ -1,4 +1,4 @@
-#include "abbe/calib/sparse/penalty.hpp"
+#include "abbe/calib/internal/sparse/penalty.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "abbe/calib/sparse/cross_validation.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
 #include "sparse_reference.hpp"
 
 namespace {

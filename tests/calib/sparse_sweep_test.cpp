@@ -1,11 +1,11 @@
-#include "abbe/calib/sparse/sweep.hpp"
+#include "abbe/calib/internal/sparse/sweep.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <random>
 
-#include "abbe/calib/sparse/penalty.hpp"
+#include "abbe/calib/internal/sparse/penalty.hpp"
 
 namespace {
 using namespace abbe::calib::sparse;

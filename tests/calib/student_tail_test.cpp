@@ -1,4 +1,4 @@
-#include "student_tail.hpp"
+#include "abbe/calib/internal/statistics/student_tail.hpp"
 
 #include <gtest/gtest.h>
 

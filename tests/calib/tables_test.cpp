@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "abbe/calib/axis_table.hpp"
-#include "abbe/calib/parameter_layout.hpp"
+#include "abbe/calib/geometry/axis_table.hpp"
+#include "abbe/calib/geometry/parameter_layout.hpp"
 
 namespace {
 using namespace abbe::calib;

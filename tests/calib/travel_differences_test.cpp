@@ -1,5 +1,5 @@
 // V of a model for a direction of travel: algebra, stored form, refused input.
-#include "abbe/calib/travel_differences.hpp"
+#include "abbe/calib/geometry/travel_differences.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,16 +9,13 @@
 #include <utility>
 
 #include "abbe/calib/joint/part.hpp"
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/model_update.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/model/model_update.hpp"
 #include "otf_run.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::tests::otf;
-using estimation::AxisTravel;
-using estimation::Travel;
-using estimation::TravelDependence;
 using testing::HasSubstr;
 
 constexpr auto kBack = Travel::Backward, kRest = Travel::Unknown, kForth = Travel::Forward;
@@ -27,15 +24,15 @@ const Vector3 kTravelTool(0.02, -0.015, -0.12), kTravelPlace(0.13, -0.11, -0.27)
 /// A model with differences of some um, and the joint covariance of its tables and differences.
 struct WithTravel {
   VolumetricModel model;
-  estimation::TableBasis basis;
+  TableBasis basis;
   Eigen::MatrixXd joint;
 };
 
-WithTravel model_with_travel(TravelDependence kind, estimation::Interpolation interpolation) {
+WithTravel model_with_travel(TravelDependence kind, Interpolation interpolation) {
   const ParameterLayout layout = layout_of(coarse_machine("[w X' b Y Z t]"));
-  auto options = estimation::TableOptions::all_axes(interpolation);
+  auto options = TableOptions::all_axes(interpolation);
   options.travel = kind;
-  const auto basis = *estimation::TableBasis::of(layout, options);
+  const auto basis = *TableBasis::of(layout, options);
   const auto n = static_cast<Eigen::Index>(layout.model_size()),
              all = static_cast<Eigen::Index>(basis.size());
 
@@ -62,13 +59,13 @@ WithTravel model_with_travel(TravelDependence kind, estimation::Interpolation in
 }
 
 /// All columns at a state, dense.
-Eigen::Matrix3Xd dense_columns(const estimation::TableBasis& basis, const AxisTravel& travel) {
-  std::vector<estimation::Column> memory(basis.most_columns());
-  estimation::ModelColumns columns(memory);
+Eigen::Matrix3Xd dense_columns(const TableBasis& basis, const AxisTravel& travel) {
+  std::vector<Column> memory(basis.most_columns());
+  ModelColumns columns(memory);
   basis.append_columns({.q_m = kTravelPlace, .tool_offset_m = kTravelTool, .travel = travel},
                        columns);
   Eigen::Matrix3Xd dense = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(basis.size()));
-  for (const estimation::Column& c : columns.span()) {
+  for (const Column& c : columns.span()) {
     dense.col(static_cast<Eigen::Index>(c.parameter)) += c.dV_dU;
   }
   return dense;
@@ -80,16 +77,16 @@ Eigen::VectorXd all_values(const VolumetricModel& model) {
   return U;
 }
 
-using FormOfTravel = std::tuple<TravelDependence, estimation::Interpolation>;
+using FormOfTravel = std::tuple<TravelDependence, Interpolation>;
 class DirectionOfTravel : public testing::TestWithParam<FormOfTravel> {
  protected:
   const WithTravel made_ = model_with_travel(std::get<0>(GetParam()), std::get<1>(GetParam()));
 };
-INSTANTIATE_TEST_SUITE_P(
-    Forms, DirectionOfTravel,
-    testing::Combine(testing::Values(TravelDependence::Backlash, TravelDependence::Tables),
-                     testing::Values(estimation::Interpolation::Linear,
-                                     estimation::Interpolation::NaturalCubic)));
+INSTANTIATE_TEST_SUITE_P(Forms, DirectionOfTravel,
+                         testing::Combine(testing::Values(TravelDependence::Backlash,
+                                                          TravelDependence::Tables),
+                                          testing::Values(Interpolation::Linear,
+                                                          Interpolation::NaturalCubic)));
 
 TEST_P(DirectionOfTravel, OfAllAxesGivesVOfTheJointParameters) {
   const Eigen::VectorXd U = all_values(made_.model);
@@ -164,7 +161,7 @@ TEST_P(DirectionOfTravel, IsRefusedWithAnotherCovariance) {
 /// Of an axis that moved in one direction only the prior remains: V is not known in either.
 TEST(UndeterminedDifference, IsInTheUncertaintyOfEachDirection) {
   const WithTravel made =
-      model_with_travel(TravelDependence::Backlash, estimation::Interpolation::Linear);
+      model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
   TravelDifferences d = *made.model.travel();
   d.cov_U_D.col(0).setZero();  // EXX
   d.covariance.row(0).setZero();
@@ -180,7 +177,7 @@ TEST(UndeterminedDifference, IsInTheUncertaintyOfEachDirection) {
 /// An update, or common tables, would lose the differences without a message.
 TEST(ModelWithDifferences, IsNeitherUpdatedNorJoined) {
   const WithTravel made =
-      model_with_travel(TravelDependence::Backlash, estimation::Interpolation::Linear);
+      model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
   ModelDescription d = made.model.description();
   d.travel.reset();
   const VolumetricModel without = *VolumetricModel::from_description(d);
@@ -197,7 +194,7 @@ TEST(ModelWithDifferences, IsNeitherUpdatedNorJoined) {
 
 TEST(ModelWithoutDifferences, IsTheSameInEveryDirection) {
   const WithTravel made =
-      model_with_travel(TravelDependence::Backlash, estimation::Interpolation::Linear);
+      model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
   ModelDescription d = made.model.description();
   d.travel.reset();
   const VolumetricModel model = *VolumetricModel::from_description(d);

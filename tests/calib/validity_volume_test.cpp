@@ -1,4 +1,4 @@
-#include "abbe/calib/validity_volume.hpp"
+#include "abbe/calib/geometry/validity_volume.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,8 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "abbe/calib/validity_volume.hpp"
-#include "abbe/calib/verify/interpolation.hpp"
+#include "abbe/calib/geometry/validity_volume.hpp"
+#include "abbe/calib/internal/verify/interpolation.hpp"
 
 namespace abbe::calib::verify {
 namespace {

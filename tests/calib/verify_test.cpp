@@ -77,13 +77,13 @@ VolumetricModel reference_model(const std::string& solution) {
   std::vector<Vector3> balls;
   for (const auto& position : tests::evemu::reference_layout().true_m)
     balls.insert(balls.end(), position.begin(), position.end());
-  const auto design = *evemu::ScaledDesign::of(tests::evemu::reference_machine().chain, 3,
-                                               evemu::bounding_box(balls));
+  const auto design = *ScaledDesign::of(tests::evemu::reference_machine().chain, 3,
+                                               bounding_box(balls));
   const Eigen::VectorXd named = tests::evemu::reference_coefficients(solution);
   const Eigen::VectorXd c = (1000.0 * design.named_from_scaled()).fullPivLu().solve(named);
   const auto n = static_cast<Eigen::Index>(design.size());
   return *VolumetricModel::from_polynomials(
-      *evemu::EvemuModel::of(design, balls[0], c, Eigen::MatrixXd::Zero(n, n)), Gauge::Ball1,
+      *PolynomialModel::of(design, balls[0], c, Eigen::MatrixXd::Zero(n, n)), Gauge::Ball1,
       Vector3::Zero(), *ValidityVolume::hull_of(balls));
 }
 
@@ -181,7 +181,8 @@ TEST(Verification, SeesNoEffectInNoise) {
   EXPECT_EQ(effect_at_points(c), Effect::NotSeen);
 }
 
-/// Errors that all shots of a place share (20 um, drawn for each place), and noise of each shot (1 um).
+/// Errors that all shots of a place share (20 um, drawn for each place), and noise of each shot (1
+/// um).
 std::vector<MeasuredPoint> shots_at(const std::vector<Vector3>& places,
                                     const std::vector<int>& shots, unsigned seed) {
   std::mt19937 random(seed);

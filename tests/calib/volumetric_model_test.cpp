@@ -1,4 +1,4 @@
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -222,11 +222,11 @@ TEST(VolumetricModel, OfTablesHasTheirNodesAndNoPolynomials) {
 TEST(VolumetricModel, OfPolynomialsHasNodesOverItsVolumeAndNoTables) {
   const Made m = random_model(1e-4);
   const auto design =
-      evemu::ScaledDesign::of(m.layout.chain(), 2, {{0.0, 0.0, -0.2}, {0.3, 0.25, 0.2}});
+      ScaledDesign::of(m.layout.chain(), 2, {{0.0, 0.0, -0.2}, {0.3, 0.25, 0.2}});
   const auto n = static_cast<Eigen::Index>(design->size());
   const auto polynomials =
-      evemu::EvemuModel::of(*design, Vector3::Zero(), Eigen::VectorXd::Constant(n, 1e-5),
-                            Eigen::MatrixXd::Identity(n, n) * 1e-12);
+      PolynomialModel::of(*design, Vector3::Zero(), Eigen::VectorXd::Constant(n, 1e-5),
+                                 Eigen::MatrixXd::Identity(n, n) * 1e-12);
   const auto model =
       VolumetricModel::from_polynomials(*polynomials, Gauge::Ball1, kTool, whole_volume(m.layout));
   ASSERT_TRUE(model) << model.error().text;

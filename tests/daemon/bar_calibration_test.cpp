@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "abbe/calib/mfb/points_of_interest.hpp"
+#include "abbe/calib/mfb/run/points_of_interest.hpp"
 #include "simulated_bar.hpp"
 
 namespace abbe::tests::mfb {

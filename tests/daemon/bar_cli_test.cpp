@@ -1,5 +1,5 @@
-/// `abbe identify bar` with the files of `abbe sim bar`, and `abbe identify mfb` with the bar that it
-/// wrote and the files of `abbe sim mfb`.
+/// `abbe identify bar` with the files of `abbe sim bar`, and `abbe identify mfb` with the bar that
+/// it wrote and the files of `abbe sim mfb`.
 
 #include <gmock/gmock.h>
 

@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "faults_text.hpp"
 #include "recording_fixture.hpp"

@@ -28,8 +28,8 @@ constexpr double kTrue_m = 1.0;  // position of X, measured from where its scale
 constexpr double kUm = 1e6;
 constexpr nanoseconds kBreaksAt = 10min, kEnd = 70min;
 
-/// Scale of X and its twin on inputs 1 and 3, air on 2, another module's inputs from 5 on. The scale
-/// warms up by 5 K/h.
+/// Scale of X and its twin on inputs 1 and 3, air on 2, another module's inputs from 5 on. The
+/// scale warms up by 5 K/h.
 sim::EnvironmentModel shop_floor() {
   sim::EnvironmentModel model;
   model.temperature_C[0] = {.mean = 21.0, .drift_per_hour = 5.0};

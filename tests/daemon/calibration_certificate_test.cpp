@@ -37,7 +37,8 @@ CertificateDetails certificate_details() {
   return d;
 }
 
-/// Measured on 2024-05-17, or this number of days later, from 8:00 to 8:30 UTC, and identified then.
+/// Measured on 2024-05-17, or this number of days later, from 8:00 to 8:30 UTC, and identified
+/// then.
 ReportSubject certified_subject(unsigned seed, int days_later = 0) {
   using protocol::UtcTime;
   ReportSubject subject{.document = test::synthetic_document(seed),

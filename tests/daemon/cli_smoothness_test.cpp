@@ -80,14 +80,14 @@ TEST_F(CliSmoothness, RefusesWhatIsNoSize) {
 }
 
 TEST(SmoothnessConfig, IsReadAndPassedToTheIdentification) {
-  EXPECT_FALSE(parse_config(kMachine, "abbed.toml")->otf.smoothness);
+  EXPECT_FALSE(parse_config(kMachine, "abbed.toml")->otf.smoothness_m);
   const auto config = parse_config(kMachine + "[otf]\nsmoothness_um = [1, 0, 2.5]\n", "abbed.toml");
   ASSERT_TRUE(config) << config.error().text;
   const auto options = otf_options({}, *config);
   ASSERT_TRUE(options.smoothness);
   EXPECT_THAT(options.smoothness->bend_m, ElementsAre(1e-6, 0.0, 2.5e-6));
   EXPECT_FALSE(
-      parse_config(kMachine + "[otf]\nsmoothness = \"none\"\n", "abbed.toml")->otf.smoothness);
+      parse_config(kMachine + "[otf]\nsmoothness = \"none\"\n", "abbed.toml")->otf.smoothness_m);
 }
 
 TEST(SmoothnessConfig, RefusesTwoStatementsAndOtherSizes) {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/recording/recorder.hpp"
 #include "abbe_command.hpp"

@@ -63,8 +63,8 @@ inline toml::table another(const toml::node& value) {
   return out;
 }
 
-/// Without indices and names of axes: "encoder.nodes.tpdo", "axes.min_mm". Devices of the environment
-/// keep their index.
+/// Without indices and names of axes: "encoder.nodes.tpdo", "axes.min_mm". Devices of the
+/// environment keep their index.
 inline std::string general(const std::string& key) {
   if (key.starts_with("environment[")) return key;
   const std::string unnamed = std::regex_replace(key, std::regex{"^axes\\.[A-Z]\\."}, "axes.");

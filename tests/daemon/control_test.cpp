@@ -108,7 +108,8 @@ TEST_F(Control, AFaultInTheDaemonIsNotReportedAsAWrongRequest) {
       << answer.error().text;
 }
 
-// std::bad_alloc outside the handler, or what a library throws: it ends the request, not the socket.
+// std::bad_alloc outside the handler, or what a library throws: it ends the request, not the
+// socket.
 TEST_F(Control, AnExceptionOfAnyKindEndsOnlyItsRequest) {
   const auto server = ControlServer::open(socket(), [](const json& request, const ControlPeer&) {
     if (request.contains("bad")) throw 1;  // NOLINT: not derived from std::exception

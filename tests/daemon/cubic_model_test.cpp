@@ -1,8 +1,8 @@
 // A model of cubic tables from the configuration to store and subscribers.
 #include <gmock/gmock.h>
 
-#include "abbe/calib/interpolation_grid.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/calib/model/interpolation_grid.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/publishing/idl_messages.hpp"
 #include "config_fixture.hpp"
 #include "synthetic_model.hpp"
@@ -10,7 +10,7 @@
 namespace abbe::daemon {
 namespace {
 
-using calib::estimation::Interpolation;
+using calib::Interpolation;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 

@@ -118,7 +118,7 @@ TEST_P(EveryFormat, GivesAtRandomPlacesWhatItHolds) {
 
 TEST_P(EveryFormat, OfCubicTables) {
   auto description = test::synthetic_model(5).description();
-  description.interpolation = calib::estimation::Interpolation::NaturalCubic;
+  description.interpolation = calib::Interpolation::NaturalCubic;
   const auto model = calib::VolumetricModel::from_description(std::move(description)).value();
   const auto made = made_export(GetParam(), model);
   const auto proof = proof_of(made, made.files);

@@ -212,7 +212,7 @@ TEST_F(FilesPage, NamesEveryKeyOfAModel) {
   document.recording_gap = "damaged";
   document.mode = "standstill";
   document.model = test::synthetic_travel_model(1);
-  document.backlash = calib::otf::backlash_of(document.model);
+  document.backlash = calib::backlash_of(document.model);
   const auto parsed = nlohmann::json::parse(to_json(document));
   for (const auto& [key, value] : parsed.items())
     EXPECT_THAT(sections_.at("model.json").text, HasSubstr("`" + key + "`"));

@@ -6,8 +6,8 @@
 #include <mutex>
 #include <thread>
 
-#include "abbe/calib/otf/plan.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/drivers/status_board.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "allocation_count.hpp"

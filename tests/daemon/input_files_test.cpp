@@ -180,8 +180,8 @@ TEST_F(InputFiles, TimesAreSinceTheFirstRow) {
 }
 
 TEST_F(InputFiles, MayHaveADirectionOfTravelPerPoint) {
-  using calib::estimation::AxisTravel;
-  using calib::estimation::Travel;
+  using calib::AxisTravel;
+  using calib::Travel;
   const std::string header = "x_mm,y_mm,z_mm,dx,dy,dz\n";
   const auto points = read_points_csv(write("p.csv", header + "1,2,3,+,-,0\n1,2,3,-,-,+\n"));
   ASSERT_TRUE(points) << points.error().details.front();

@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/evemu_files.hpp"

@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "abbe/calib/otf/encoder_log.hpp"
+#include "abbe/calib/otf/run/encoder_log.hpp"
 #include "otf_run.hpp"
 #include "text_files.hpp"
 

@@ -124,7 +124,8 @@ std::string all_defaults(const std::string& text) {
   return std::regex_replace(text, std::regex{"\n#([a-z_A-Z]+ = )"}, "\n$1");
 }
 
-/// A configuration whose keys are changed. `values` as in single_changes(), before those of kValues.
+/// A configuration whose keys are changed. `values` as in single_changes(), before those of
+/// kValues.
 struct Base {
   std::string name, text;
   std::map<std::string, std::string> values{};

@@ -106,7 +106,8 @@ std::string with_backward_passes_in_plan(const std::string& plan) {
 }
 
 /// V at the nodes X = 100, Y = 200, Z = 300 mm: translations, rotations with their levers, and
-/// squareness, which tilts the travel only [rigid_body_model.hpp]. Values of tables.csv, um and urad.
+/// squareness, which tilts the travel only [rigid_body_model.hpp]. Values of tables.csv, um and
+/// urad.
 Vector3 V_um_at_100_200_300(const std::map<std::string, TableRow>& tables, const Vector3& t_mm) {
   const auto vector_of = [&](const std::string& kinds, char axis, int node) {
     Vector3 v;

@@ -1,5 +1,5 @@
-/// `abbe identify mfb` with touches, plans and files that people get wrong: exit codes, messages, and
-/// what is named.
+/// `abbe identify mfb` with touches, plans and files that people get wrong: exit codes, messages,
+/// and what is named.
 
 #include "mfb_folder.hpp"
 
@@ -18,9 +18,10 @@ using ::testing::SizeIs;
 
 using MfbRefusals = test::MfbFolder;
 
-/// A row of X2 as the machine would measure it if the bar lay turned by 180 degrees about its z axis:
-/// (x, y, z) of the bar is at (550 mm - x, -y, z). The row names what is touched as if the bar lay as
-/// planned.
+/// A row of X2 as the machine would measure it if the bar lay turned by 180 degrees about its z
+/// axis:
+/// (x, y, z) of the bar is at (550 mm - x, -y, z). The row names what is touched as if the bar lay
+/// as planned.
 std::string turned_about_z(const std::string& row) {
   const auto cells = cells_of(row);
   const int index = std::stoi(cells.at(2)), k = std::stoi(cells.at(4));

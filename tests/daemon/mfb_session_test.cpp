@@ -1,5 +1,5 @@
-/// The live session with a Multi-Feature Bar: request, acquisition of touches as the hub brings them,
-/// refusals before the first touch.
+/// The live session with a Multi-Feature Bar: request, acquisition of touches as the hub brings
+/// them, refusals before the first touch.
 #include <gmock/gmock.h>
 
 #include <algorithm>

@@ -361,7 +361,8 @@ RunFigures measured_at(protocol::UtcTime first, protocol::UtcTime last) {
   return run;
 }
 
-/// A recording that is identified again later: the date of the measurement is that of the recording.
+/// A recording that is identified again later: the date of the measurement is that of the
+/// recording.
 TEST(ModelReport, StatesWhenWasMeasuredAndWhenItWasIdentified) {
   ReportSubject subject = reported(3);
   EXPECT_THAT(model_report(subject).value(),

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe_command.hpp"
 #include "config_fixture.hpp"
@@ -32,7 +33,7 @@ TEST(ConfigNests, AreReadWithNamePositionAndRadius) {
           "[[tracker.nest]]\nname = \"B\"\nposition_mm = [1800, 950, 150]\nradius_mm = 20\n",
       "machine.toml");
   ASSERT_TRUE(config) << config.error().text;
-  const calib::otf::NestOptions& nests = config->otf.nests;
+  const calib::otf::NestOptions nests = nest_options(config->otf);
   EXPECT_DOUBLE_EQ(nests.u_repeatability_m, 4e-6);
   ASSERT_THAT(nests.nests, SizeIs(2));
   EXPECT_EQ(nests.nests[0].name, "A");

@@ -1,3 +1,4 @@
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 
 #include <gmock/gmock.h>
@@ -35,7 +36,7 @@ TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
 }
 
 TEST(OtfPath, WithBacklashMustMoveEveryAxis) {
-  using enum calib::estimation::TravelDependence;
+  using enum calib::TravelDependence;
   const std::vector<AxisPosition> flat{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.05, 0}, {0, 0.05, 0}};
   using calib::otf::Mode;
   EXPECT_TRUE(check_otf_path(flat, machine(), Mode::Standstill, None));
@@ -50,18 +51,17 @@ TEST(OtfPath, WithBacklashMustMoveEveryAxis) {
 }
 
 TEST(OtfInputs, TheConfigurationNamesTheEstimator) {
-  using calib::otf::Estimator;
-  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+  for (const auto estimator : {OtfEstimator::TwoStep, OtfEstimator::Joint}) {
     const OtfConfig otf{.estimator = estimator};
-    EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = otf}).estimator, estimator);
+    EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = otf}).estimator, calib_of(estimator));
   }
 }
 
 TEST(OtfInputs, TheConfigurationNamesTheFormOfBacklash) {
-  using enum calib::estimation::TravelDependence;
+  using enum calib::TravelDependence;
   EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = {}}).backlash, None);
   for (const auto form : {Backlash, Tables}) {
-    const OtfConfig otf{.backlash = form};
+    const OtfConfig otf{.backlash = config_of(form)};
     EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = otf}).backlash, form);
   }
 }

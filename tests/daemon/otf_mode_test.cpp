@@ -31,9 +31,9 @@ std::optional<Mode> recorded_mode(const OtfRequest& request, const Config* confi
 }
 
 TEST(OtfModeConfig, IsOnTheFlyUnlessStated) {
-  EXPECT_EQ(configuration("").otf.mode, Mode::OnTheFly);
+  EXPECT_EQ(configuration("").otf.mode, OtfMode::OnTheFly);
   const Config stands = configuration("[otf]\nmode = \"standstill\"\nu_repeatability_um = 2\n");
-  EXPECT_EQ(stands.otf.mode, Mode::Standstill);
+  EXPECT_EQ(stands.otf.mode, OtfMode::Standstill);
   EXPECT_DOUBLE_EQ(stands.otf.u_repeatability_m, 2e-6);
   const auto refused =
       parse_config(test::synthetic_machine_toml() + "[otf]\nmode = \"static\"\n", "machine.toml");
@@ -58,7 +58,7 @@ TEST(OtfModeRequest, IsRefusedWithAnotherMode) {
   EXPECT_THAT(task_from_json(object).error().text, HasSubstr("mode \"static\": must be"));
 }
 
-class OtfMode : public ::testing::Test {
+class StandstillRun : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::path(::testing::TempDir()) / fmt::format("otf_mode_{}", ::getpid());
@@ -71,7 +71,7 @@ class OtfMode : public ::testing::Test {
   fs::path folder_;
 };
 
-TEST_F(OtfMode, IdentifiesFromFilesWhereTheMachineStood) {
+TEST_F(StandstillRun, IdentifiesFromFilesWhereTheMachineStood) {
   test::write_synthetic_run(folder_);
   const std::string files = "--machine machine.toml --path path.csv --tracker tracker.csv -o out";
   const Ran ran = test::run_abbe(folder_, "identify otf --mode standstill " + files);
@@ -84,7 +84,7 @@ TEST_F(OtfMode, IdentifiesFromFilesWhereTheMachineStood) {
               HasSubstr("laser tracker (otf, standstill), estimator two-step"));
 }
 
-TEST_F(OtfMode, ErrorsNameFileAndTime) {
+TEST_F(StandstillRun, ErrorsNameFileAndTime) {
   test::write_synthetic_run(folder_);
   std::string path = test::synthetic_path_csv();
   path.erase(path.rfind('\n', path.size() - 2) + 1);
@@ -97,7 +97,7 @@ TEST_F(OtfMode, ErrorsNameFileAndTime) {
   EXPECT_THAT(ran.err, AllOf(HasSubstr("tracker.csv: standstills:"), HasSubstr(" s at (")));
 }
 
-TEST_F(OtfMode, OfARecordedRequestIsUsedByTheReplay) {
+TEST_F(StandstillRun, OfARecordedRequestIsUsedByTheReplay) {
   const fs::path recording = test::record_synthetic_run(folder_, Mode::Standstill);
   const Ran ran = test::run_abbe(
       folder_, fmt::format("identify otf --recording '{}' -o out", recording.string()));

@@ -1,11 +1,11 @@
-/// The paths of a measuring machine along a Multi-Feature Bar and a step gauge, beside the simulated
-/// bar: the tip reaches every feature and touches nothing on its way.
+/// The paths of a measuring machine along a Multi-Feature Bar and a step gauge, beside the
+/// simulated bar: the tip reaches every feature and touches nothing on its way.
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 
-#include "abbe/calib/mfb/pass_on_machine.hpp"
+#include "abbe/calib/mfb/plan/pass_on_machine.hpp"
 #include "abbe/sim/measuring_machine.hpp"
 #include "abbe/sim/mfb/reversal.hpp"
 #include "simulated_bar.hpp"

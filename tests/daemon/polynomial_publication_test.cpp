@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
 #include "abbe/messages/cdr.hpp"
 #include "abbe/publishing/idl_messages.hpp"
 #include "evemu_run.hpp"

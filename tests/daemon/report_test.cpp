@@ -24,7 +24,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-calib::VolumetricModel with_interpolation(calib::estimation::Interpolation kind) {
+calib::VolumetricModel with_interpolation(calib::Interpolation kind) {
   auto description = test::synthetic_model(3).description();
   description.interpolation = kind;
   return calib::VolumetricModel::from_description(std::move(description)).value();
@@ -108,7 +108,7 @@ TEST(Report, TheBandsAreTheUncertaintiesOfTheModel) {
 
 /// Of a model in which all other tables are zero, V_x is EXX.
 TEST(Report, ATableIsDrawnAsTheModelInterpolatesIt) {
-  using calib::estimation::Interpolation;
+  using calib::Interpolation;
   for (const auto kind : {Interpolation::Linear, Interpolation::NaturalCubic}) {
     auto description = with_interpolation(kind).description();
     for (auto& p : description.parameters)
@@ -126,7 +126,7 @@ TEST(Report, ATableIsDrawnAsTheModelInterpolatesIt) {
 
 /// Of a model in which only EXX is uncertain, the variance of V_x is that of EXX.
 TEST(Report, TheBandsBetweenNodesAreTwoStandardUncertaintiesOfV) {
-  using calib::estimation::Interpolation;
+  using calib::Interpolation;
   for (const auto kind : {Interpolation::Linear, Interpolation::NaturalCubic}) {
     auto description = with_interpolation(kind).description();
     for (std::size_t i = 0; i < description.parameters.size(); ++i) {

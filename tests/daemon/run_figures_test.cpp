@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "abbe/methods/otf/document.hpp"
 #include "abbe/report/model_report.hpp"
 #include "otf_run.hpp"

@@ -49,7 +49,8 @@ struct PipeEnds {
   std::array<int, 2> ends{-1, -1};
 };
 
-/// Runs `act` in a child process whose stderr is the pipe. The child ends by exit(): as main() does.
+/// Runs `act` in a child process whose stderr is the pipe. The child ends by exit(): as main()
+/// does.
 pid_t start_with_stderr(PipeEnds& pipe, const std::function<void()>& act) {
   const pid_t child = ::fork();
   if (child == 0) {

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe_command.hpp"
 #include "report_page.hpp"

@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "abbe/base/control_protocol.hpp"
-#include "abbe/calib/otf/plan.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
 #include "abbe/service/abbed.hpp"
 #include "abbe/sim/tracker_server.hpp"
 #include "abbe_command.hpp"
@@ -157,8 +157,8 @@ class TrackerControl : public ::testing::Test {
     return {{"do", "tracker"}, {"order", "reflector set"}, {"reflector", name}};
   }
   /// A path that determines the model of half_metre_mill(). Edges and diagonals of a cube do not:
-  /// errors that are the same in EXX, EYY and EZZ displace no point across its leg. So a part of the
-  /// volume with three different lengths follows.
+  /// errors that are the same in EXX, EYY and EZZ displace no point across its leg. So a part of
+  /// the volume with three different lengths follows.
   static json calibrate() {
     const auto long_m = *calib::equidistant_nodes(0.0, 0.5),
                medium_m = *calib::equidistant_nodes(0.0, 0.4),

@@ -9,7 +9,7 @@
 namespace abbe::daemon {
 namespace {
 
-using calib::estimation::Travel;
+using calib::Travel;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -34,7 +34,7 @@ TEST(TravelDocument, ReadsBackToTheSameBytesAndTheSameV) {
   ASSERT_TRUE(read) << read.error().text << read.error().details.front();
   EXPECT_EQ(to_json(*read), to_json(written));
   const calib::Vector3 q(0.1, 0.05, -0.2), tool = written.model.tool_offsets_m().front();
-  const calib::estimation::AxisTravel travel{Travel::Forward, Travel::Backward, Travel::Forward};
+  const calib::AxisTravel travel{Travel::Forward, Travel::Backward, Travel::Forward};
   const auto a = written.model.error_at(q, tool, travel), b = read->model.error_at(q, tool, travel);
   EXPECT_EQ(a.V_m, b.V_m);
   EXPECT_EQ(a.cov_V_m2, b.cov_V_m2);

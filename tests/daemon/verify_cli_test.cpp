@@ -13,7 +13,7 @@
 #include <sstream>
 
 #include "abbe/base/control_protocol.hpp"
-#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
 #include "abbe/methods/evemu/document.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"

@@ -22,8 +22,8 @@ using drivers::ProbePoint;
 using protocol::TouchFlag;
 using testing::HasSubstr;
 
-/// A stage whose device throws once, when the machine begins to be held: after AbortE counts as sent,
-/// before it is sent.
+/// A stage whose device throws once, when the machine begins to be held: after AbortE counts as
+/// sent, before it is sent.
 struct ThrowingStage : MovingStage {
   ThrowingStage() : MovingStage(options()) {
     inject(sim::FaultKind::EmergencyStop);

@@ -1,6 +1,6 @@
 // Any parameters as the announcement of a participant, a writer or a reader: what passes the
-// message filter is read by Fast DDS without more memory than an announcement needs. Fast DDS is not
-// instrumented: reads beyond the message are found only where they end the process.
+// message filter is read by Fast DDS without more memory than an announcement needs. Fast DDS is
+// not instrumented: reads beyond the message are found only where they end the process.
 //
 // libFuzzer: -max_len=2048 -malloc_limit_mb=8
 

@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_drift.hpp"
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_drift.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "figure.hpp"
 #include "otf_run.hpp"

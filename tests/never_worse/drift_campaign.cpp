@@ -1,7 +1,7 @@
 // Repeated short on-the-fly runs of random machines against one active model each: how often an
 // unchanged machine raises DRIFT, and how often one does of which a table moved by 6 standard
-// uncertainties of the difference of two runs. For every run the tracker is set up again, and ranges
-// and scales have other errors. Also with input that the test does not expect.
+// uncertainties of the difference of two runs. For every run the tracker is set up again, and
+// ranges and scales have other errors. Also with input that the test does not expect.
 // Arguments: [MACHINES [UNCHANGED [MOVED [FIRST_SEED]]]], by default 2, 100, 20 runs.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_drift.hpp"
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_drift.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
 #include "figure.hpp"
 #include "otf_run.hpp"
 #include "random_numbers.hpp"

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 #include "random_numbers.hpp"
 
 namespace abbe::tests::never_worse {
@@ -139,7 +139,7 @@ std::vector<Vector3> ball_centres(const EvemuRun& run) {
 }
 
 void set_ranges(EvemuRun& run) {
-  const evemu::ReadingBox box = evemu::bounding_box(ball_centres(run));
+  const calib::ReadingBox box = calib::bounding_box(ball_centres(run));
   constexpr double kBeyond_m = 0.02;
   for (const sim::Axis a : sim::kAxes) {
     const auto k = static_cast<Eigen::Index>(a);
@@ -302,7 +302,7 @@ void scale_errors(EvemuRun& run, double mean_error_m) {
 
 /// About 250 points inside the validity volume of the model.
 std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
-  const evemu::ReadingBox box = evemu::bounding_box(volume.vertices_m());
+  const calib::ReadingBox box = calib::bounding_box(volume.vertices_m());
   constexpr int kSteps = 10;
   std::vector<Vector3> found;
 
@@ -338,7 +338,7 @@ void compare(Outcome& outcome, const EvemuRun& run, const calib::VolumetricModel
   const auto rows = 3 * std::ssize(points);
   sim::TruthMachine truth_machine = run.truth;
   truth_machine.target_offset_m = run.stated_tool_offset_m;
-  const evemu::EvemuModel& polynomials = *model.polynomials();
+  const calib::PolynomialModel& polynomials = *model.polynomials();
   Eigen::VectorXd truth(rows), left(rows);
   Eigen::MatrixXd B(rows, static_cast<Eigen::Index>(polynomials.design().size()));
 

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
 #include "abbe/sim/ball_array.hpp"
 #include "abbe/sim/truth_machine.hpp"
 #include "campaign.hpp"
@@ -40,7 +40,8 @@ struct EvemuRun {
   std::function<Eigen::Isometry3d(const TouchTime&)> moved;
   /// Displacement of a point of the array, in its own frame; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& place_m)> bent;
-  /// Error of the machine at a scale reading that no error motion of `truth` contains; may be empty.
+  /// Error of the machine at a scale reading that no error motion of `truth` contains; may be
+  /// empty.
   std::function<Vector3(const Vector3& q_m)> more_error_m;
   /// Error of the machine in addition to the constant V, in machine coordinates; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& q_m)> drift;

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "abbe/calib/joint/contribution.hpp"
-#include "abbe/calib/otf/lack_of_fit.hpp"
+#include "abbe/calib/otf/judge/lack_of_fit.hpp"
 #include "figure.hpp"
 #include "joint_triple.hpp"
 

@@ -1,12 +1,13 @@
 #pragma once
-/// A random machine, a Multi-Feature Bar touched on it, and typical faults of a shop floor; then the
-/// verdict of the gate, and the error of the model against the truth. Deterministic from the seed.
+/// A random machine, a Multi-Feature Bar touched on it, and typical faults of a shop floor; then
+/// the verdict of the gate, and the error of the model against the truth. Deterministic from the
+/// seed.
 
 #include <functional>
 #include <random>
 #include <vector>
 
-#include "abbe/calib/mfb/judge.hpp"
+#include "abbe/calib/mfb/judge/judge.hpp"
 #include "campaign.hpp"
 #include "mfb_simulation.hpp"
 

@@ -1,5 +1,5 @@
-// A short version of the campaign of scripts/soak never-worse with a Multi-Feature Bar: one machine,
-// some faults.
+// A short version of the campaign of scripts/soak never-worse with a Multi-Feature Bar: one
+// machine, some faults.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

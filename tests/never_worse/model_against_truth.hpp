@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 #include "campaign.hpp"
 
 namespace abbe::tests::never_worse {
@@ -16,8 +16,8 @@ struct Box {
   calib::Vector3 low_m, high_m;  ///< scale readings
 };
 
-/// Sets the figures of `outcome` but those of U(V), from a grid of 9 x 9 x 9 readings. Intervals are
-/// those of V as the gauge of the model states it: `true_V_m` is in this gauge.
+/// Sets the figures of `outcome` but those of U(V), from a grid of 9 x 9 x 9 readings. Intervals
+/// are those of V as the gauge of the model states it: `true_V_m` is in this gauge.
 inline void compare_with_truth(
     Outcome& outcome, const calib::VolumetricModel& model, const Box& box,
     const calib::Vector3& tool_offset_m,

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "model_against_truth.hpp"
 #include "otf_reference.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/otf/judge.hpp"
+#include "abbe/calib/otf/judge/judge.hpp"
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/sim/truth_machine.hpp"
 #include "campaign.hpp"
@@ -25,7 +25,8 @@ struct OtfRun {
   sim::TruthMachine truth;
   std::vector<Vector3> driven_m;  ///< vertices, scale readings
   calib::RigidTransform T_machine_tracker;
-  /// Error of the machine at a scale reading that no error motion of `truth` contains; may be empty.
+  /// Error of the machine at a scale reading that no error motion of `truth` contains; may be
+  /// empty.
   std::function<Vector3(const Vector3& q_m)> more_error_m;
   /// displacement of the target in the machine; may be empty
   std::function<calib::RigidTransform(double time_share)> moved;

@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "abbe/calib/estimation/table_basis.hpp"
+#include "abbe/calib/geometry/table_basis.hpp"
 #include "otf_run.hpp"
 
 namespace abbe::tests::otf {
@@ -13,14 +13,14 @@ struct BacklashOfRun {
   /// one per table, or one per node.
   Eigen::VectorXd values;
   /// Of all axes before their first motion.
-  calib::estimation::Travel start = calib::estimation::Travel::Backward;
+  calib::Travel start = calib::Travel::Backward;
 };
 
-inline calib::estimation::TableBasis basis_with(const calib::ParameterLayout& layout,
-                                                const BacklashOfRun& backlash) {
-  using enum calib::estimation::TravelDependence;
+inline calib::TableBasis basis_with(const calib::ParameterLayout& layout,
+                                    const BacklashOfRun& backlash) {
+  using enum calib::TravelDependence;
   const bool per_table = backlash.values.size() == std::ssize(layout.tables());
-  return *calib::estimation::TableBasis::of(layout, {.travel = per_table ? Backlash : Tables});
+  return *calib::TableBasis::of(layout, {.travel = per_table ? Backlash : Tables});
 }
 
 /// `driven_m`: axis position of each sample.
@@ -28,7 +28,7 @@ inline void add_backlash(std::span<calib::otf::TrackerObservation> samples,
                          std::span<const Vector3> driven_m, const calib::ParameterLayout& layout,
                          const Vector3& target_m, const calib::RigidTransform& T_machine_tracker,
                          const BacklashOfRun& backlash) {
-  using calib::estimation::Travel;
+  using calib::Travel;
   const auto basis = basis_with(layout, backlash);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(basis.size()));
   U.tail(backlash.values.size()) = backlash.values;

@@ -98,8 +98,8 @@ inline double slope_on_line(const otf::MadeRun& run, calib::ErrorMotion translat
          (last_m - first_m);
 }
 
-/// What a device measures between the lines of X, Y, Z through `at_m` from `first_m` to `last_m`: the
-/// rotation of the direction of travel, in three runs.
+/// What a device measures between the lines of X, Y, Z through `at_m` from `first_m` to `last_m`:
+/// the rotation of the direction of travel, in three runs.
 inline calib::direct::MeasuredError measured_squareness(const otf::MadeRun& run,
                                                         const std::string& name,
                                                         const calib::Vector3& at_m,

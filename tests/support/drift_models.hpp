@@ -6,7 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <random>
 
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace abbe::tests::otf {

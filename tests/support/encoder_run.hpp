@@ -2,8 +2,8 @@
 /// A MadeRun with scale readings of the machine's clock: at the times of the samples and between
 /// them, with white errors of their times.
 
-#include "abbe/calib/otf/encoder_log.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/run/encoder_log.hpp"
 #include "otf_run.hpp"
 
 namespace abbe::tests::otf {

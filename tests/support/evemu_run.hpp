@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
 #include "evemu_reference.hpp"
 
 namespace abbe::tests::evemu {

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
 #include "evemu_run.hpp"
 
 namespace abbe::tests::evemu {
@@ -19,7 +19,7 @@ using Field = std::function<Vector3(const Vector3& reading_m)>;
 
 /// Table 3 of [Li OMM], shifted so that V(Ball1) = 0.
 inline Field table3_machine() {
-  const auto model = *calib::evemu::EquivalentModel::of(reference_machine().chain, 3);
+  const auto model = *calib::EquivalentModel::of(reference_machine().chain, 3);
   const Eigen::VectorXd beta = reference_coefficients("true");
   const Vector3 ball1_mm(-90, 140, 30);
   const Vector3 at_ball1 = model.X(ball1_mm) * beta;
@@ -98,7 +98,7 @@ inline calib::evemu::Observations simulated(const Layout& layout, const Field& V
 /// Ball1 as Ball2 is.
 inline std::vector<Vector3> evaluation_grid(const calib::ValidityVolume& hull,
                                             const Layout& layout = reference_layout()) {
-  const auto box = calib::evemu::bounding_box(hull.vertices_m());
+  const auto box = calib::bounding_box(hull.vertices_m());
   const Vector3 step(0.1 / 3, 0.05 / 3, 0.01 / 3);
   const Vector3 low = (box.centre_m - box.half_width_m).cwiseQuotient(step),
                 high = (box.centre_m + box.half_width_m).cwiseQuotient(step);
@@ -153,13 +153,13 @@ inline Remaining remaining(const Field& V, const Field& model, const std::vector
 
 /// V of a solution, and of its coefficients before V(Ball1) = 0 was set.
 inline Field field_of(const calib::evemu::Solution& s) {
-  const calib::evemu::EvemuModel model = *s.model.polynomials();
+  const calib::PolynomialModel model = *s.model.polynomials();
   return [model](const Vector3& q) { return model.V_at(q); };
 }
 inline Field raw_field_of(const calib::evemu::Solution& s) {
   const auto& m = *s.model.polynomials();
   const auto raw =
-      *calib::evemu::EvemuModel::of(m.design(), m.ball1_m(), s.raw_c_m, m.covariance_m2());
+      *calib::PolynomialModel::of(m.design(), m.ball1_m(), s.raw_c_m, m.covariance_m2());
   return [raw](const Vector3& q) { return raw.V_at(q); };
 }
 

@@ -4,9 +4,9 @@
 
 #include <numbers>
 
-#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
 #include "abbe/calib/joint/identify.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace abbe::tests::joint {

@@ -16,8 +16,8 @@ inline constexpr double kTripleTravel_m = 0.55, kTripleNodes_m = 0.11;
 /// The machine, and its on-the-fly run.
 struct TripleMachine {
   unsigned seed = 1;
-  calib::estimation::TableBasis all;  ///< 18 tables
-  Eigen::VectorXd truth;              ///< of these
+  calib::TableBasis all;  ///< 18 tables
+  Eigen::VectorXd truth;  ///< of these
   otf::MadeRun run;
 
   [[nodiscard]] Field field() const {
@@ -54,7 +54,7 @@ inline TripleMachine triple_machine(unsigned seed) {
   run.T_machine_tracker = otf::case_a_alignment(true);
 
   const auto layout = *calib::ParameterLayout::all_tables(run.machine.chain, run.machine.nodes);
-  TripleMachine made{seed, *calib::estimation::TableBasis::of(layout),
+  TripleMachine made{seed, *calib::TableBasis::of(layout),
                      otf::random_tables(layout, kErrors_m, random), std::move(run)};
   const Field V_m = made.field();
   const Vector3& t = made.run.machine.target_offset_m;

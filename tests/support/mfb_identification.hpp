@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "abbe/calib/mfb/identify.hpp"
+#include "abbe/calib/mfb/solve/identify.hpp"
 #include "mfb_reference.hpp"
 
 namespace abbe::tests::mfb {

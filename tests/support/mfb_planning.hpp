@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abbe/calib/mfb/plan.hpp"
+#include "abbe/calib/mfb/plan/plan.hpp"
 #include "mfb_identification.hpp"
 
 namespace abbe::tests::mfb {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/mfb/features.hpp"
+#include "abbe/calib/mfb/run/features.hpp"
 
 namespace abbe::tests::mfb {
 

@@ -12,7 +12,7 @@
 #include <optional>
 #include <random>
 
-#include "abbe/calib/mfb/points_of_interest.hpp"
+#include "abbe/calib/mfb/run/points_of_interest.hpp"
 #include "mfb_identification.hpp"
 
 namespace abbe::tests::mfb {

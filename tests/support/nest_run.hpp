@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/model_comparison.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 
 namespace abbe::tests::otf {

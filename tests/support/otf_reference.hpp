@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/otf/run.hpp"
+#include "abbe/calib/otf/run/run.hpp"
 
 namespace abbe::tests::otf {
 

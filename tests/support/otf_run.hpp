@@ -9,13 +9,13 @@
 #include <span>
 #include <vector>
 
-#include "abbe/calib/gauge.hpp"
-#include "abbe/calib/otf/observe.hpp"
-#include "abbe/calib/otf/path_frame.hpp"
-#include "abbe/calib/otf/polyline.hpp"
-#include "abbe/calib/otf/run.hpp"
-#include "abbe/calib/parameter_layout.hpp"
-#include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/geometry/parameter_layout.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/otf/observe/observe.hpp"
+#include "abbe/calib/otf/run/path_frame.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
+#include "abbe/calib/otf/run/run.hpp"
 #include "otf_reference.hpp"
 
 namespace abbe::tests::otf {
@@ -35,13 +35,13 @@ struct MadeRunOptions {
   unsigned noise_seed = 1;    ///< of the tracker's noise: same machine, another run
   double noise_factor = 1.0;  ///< of the default noise model; 0: exact
   double error_scale_m = 30e-6;
-  /// Tables of gauge G1: no rotation r of their own, which would be r^2 / 2 of strain in a pose that
-  /// is not linear.
+  /// Tables of gauge G1: no rotation r of their own, which would be r^2 / 2 of strain in a pose
+  /// that is not linear.
   bool in_gauge = false;
   double speed_m_s = 0.4;
   double rate_hz = 250.0;
   std::string chain = "[w X' b Y Z (C1) t]";
-  calib::estimation::Interpolation interpolation = calib::estimation::Interpolation::Linear;
+  calib::Interpolation interpolation = calib::Interpolation::Linear;
 };
 
 inline calib::otf::Machine coarse_machine(const std::string& chain) {
@@ -105,8 +105,8 @@ inline void measure_run(MadeRun& run, const MadeRunOptions& wanted) {
   const calib::ParameterLayout layout = layout_of(run.machine);
   const Vector3& t = run.machine.target_offset_m;
   run.samples.clear();
-  const auto basis = *calib::estimation::TableBasis::of(
-      layout, calib::estimation::TableOptions::all_axes(wanted.interpolation));
+  const auto basis =
+      *calib::TableBasis::of(layout, calib::TableOptions::all_axes(wanted.interpolation));
   for (const Vector3& q : drive(run.path, wanted.speed_m_s, wanted.rate_hz)) {
     const Vector3 V =
         basis.V_m({.q_m = q, .tool_offset_m = t}, {run.truth.data(), layout.model_size()});

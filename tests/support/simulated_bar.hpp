@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "abbe/calib/mfb/bar_calibration.hpp"
+#include "abbe/calib/mfb/identify/bar_calibration.hpp"
 #include "abbe/sim/mfb/reversal.hpp"
 
 namespace abbe::tests::mfb {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/sparse/cross_validation.hpp"
+#include "abbe/calib/internal/sparse/cross_validation.hpp"
 
 namespace abbe::tests::sparse {
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "abbe/calib/otf/run.hpp"
+#include "abbe/calib/otf/run/run.hpp"
 
 namespace abbe::tests::otf {
 

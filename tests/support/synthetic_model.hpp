@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "abbe/calib/axis_table.hpp"
+#include "abbe/calib/geometry/axis_table.hpp"
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon::test {
@@ -48,8 +48,8 @@ inline calib::VolumetricModel synthetic_travel_model(unsigned seed, double D = 7
                                                      double u_D = 1e-7 * std::numbers::inv_sqrt3) {
   calib::ModelDescription d = synthetic_model(seed).description();
   const auto layout = calib::ParameterLayout::observable_with_one_target(d.chain, d.nodes).value();
-  const auto kind = calib::estimation::TravelDependence::Backlash;
-  const auto basis = calib::estimation::TableBasis::of(layout, {.travel = kind}).value();
+  const auto kind = calib::TravelDependence::Backlash;
+  const auto basis = calib::TableBasis::of(layout, {.travel = kind}).value();
   const auto n = static_cast<Eigen::Index>(layout.model_size()),
              m = static_cast<Eigen::Index>(basis.size()) - n;
 

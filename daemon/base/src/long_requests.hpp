@@ -13,8 +13,8 @@
 namespace abbe::daemon {
 
 /// Answers long requests of the control socket on a thread of its own, one after the other: a path
-/// of 10^5 vertices takes a part of a second, for which no other client would get an answer. At most
-/// kMostWaiting wait; the request of a client that has left is not carried out any more. The
+/// of 10^5 vertices takes a part of a second, for which no other client would get an answer. At
+/// most kMostWaiting wait; the request of a client that has left is not carried out any more. The
 /// functions are for one thread.
 class LongRequests {
  public:

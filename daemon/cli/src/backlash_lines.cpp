@@ -6,7 +6,7 @@
 
 namespace abbe::daemon {
 
-nlohmann::json backlash_json(std::span<const calib::otf::Backlash> backlash) {
+nlohmann::json backlash_json(std::span<const calib::Backlash> backlash) {
   auto all = nlohmann::json::array();
   for (const auto& b : backlash) {
     const bool angle = calib::is_rotation(b.motion.motion);
@@ -19,8 +19,8 @@ nlohmann::json backlash_json(std::span<const calib::otf::Backlash> backlash) {
   return all;
 }
 
-void print_backlash(std::span<const calib::otf::Backlash> backlash) {
-  for (const auto& b : calib::otf::largest_of_tables(backlash))
+void print_backlash(std::span<const calib::Backlash> backlash) {
+  for (const auto& b : calib::largest_of_tables(backlash))
     fmt::print("backlash    {} {:.3f} {}, standard uncertainty {:.3f}{}\n", calib::name(b.motion),
                b.value * kUmPerM, calib::is_rotation(b.motion.motion) ? "urad" : "um",
                b.u * kUmPerM,

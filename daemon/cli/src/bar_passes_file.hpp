@@ -1,5 +1,6 @@
 #pragma once
-/// The touches that `abbe calibrate bar` makes, pass by pass, as barpoints.csv of `abbe identify bar`.
+/// The touches that `abbe calibrate bar` makes, pass by pass, as barpoints.csv of `abbe identify
+/// bar`.
 
 #include <filesystem>
 #include <functional>
@@ -8,7 +9,7 @@
 #include <string_view>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/mfb/measurement.hpp"
+#include "abbe/calib/mfb/run/measurement.hpp"
 
 namespace abbe::daemon {
 

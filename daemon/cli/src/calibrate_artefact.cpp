@@ -15,7 +15,7 @@
 
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
-#include "abbe/calib/evemu/artefact_touches.hpp"
+#include "abbe/calib/evemu/plan/artefact_touches.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/tables/evemu_files.hpp"

@@ -19,7 +19,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/mfb/pass_on_machine.hpp"
+#include "abbe/calib/mfb/plan/pass_on_machine.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/tables/gauge_file.hpp"

@@ -6,8 +6,8 @@
 
 namespace abbe::daemon {
 
-using calib::estimation::AxisTravel;
-using calib::estimation::Travel;
+using calib::AxisTravel;
+using calib::Travel;
 
 Result<AxisTravel> parse_direction(const std::string& text) {
   constexpr std::string_view kDirections = "-0+";

@@ -4,12 +4,12 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 
 namespace abbe::daemon {
 
 /// Error Usage unless `text` is three of "+", "-", "0", separated by commas; empty: all unknown.
-[[nodiscard]] Result<calib::estimation::AxisTravel> parse_direction(const std::string& text);
+[[nodiscard]] Result<calib::AxisTravel> parse_direction(const std::string& text);
 
 /// DataInsufficient for a model that has no backlash: what it is in one direction is not known.
 /// `name` of the model is for the message.

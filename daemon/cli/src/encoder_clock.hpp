@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "abbe/tables/input_files.hpp"
 
 namespace abbe::daemon {
@@ -14,8 +14,8 @@ namespace abbe::daemon {
 /// `u_time_us`: standard uncertainty of the time of one reading.
 [[nodiscard]] calib::otf::EncoderLog encoder_log(std::span<const EncoderRow>, double u_time_us);
 
-/// otf::identify() with the scale readings. If they are not those of this drive (another clock rate,
-/// another run), the same without them, with a note in the observations that states why.
+/// otf::identify() with the scale readings. If they are not those of this drive (another clock
+/// rate, another run), the same without them, with a note in the observations that states why.
 [[nodiscard]] calib::Result<calib::otf::Identification> identify_with_scales(
     std::span<const calib::otf::TrackerObservation>, const calib::otf::Machine&,
     const calib::otf::Path&, const calib::otf::Noise&, const calib::otf::Options&,

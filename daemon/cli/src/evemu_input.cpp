@@ -11,7 +11,7 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/evemu/identification.hpp"
 #include "abbe/methods/evemu/method.hpp"
 #include "abbe/recording/recorded_clock.hpp"

@@ -9,8 +9,8 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/evemu/observe.hpp"
-#include "abbe/calib/gate.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/evemu/acquisition.hpp"

@@ -31,7 +31,7 @@ struct ExportRequest {
   calib::ExportBox box;
   calib::GridAxes nodes_m;
   /// --direction; nullopt: not given
-  std::optional<calib::estimation::AxisTravel> travel;
+  std::optional<calib::AxisTravel> travel;
   WriteOptions options;
 };
 
@@ -122,7 +122,7 @@ calib::Result<HeldCorrection> held_by(const ExportRequest& request) {
   const auto& facts = *request.facts;
   if (facts.holds == HeldPart::Grid)
     return calib::grid_of_model(model, request.tool_m, request.nodes_m,
-                                request.travel.value_or(calib::estimation::AxisTravel{}))
+                                request.travel.value_or(calib::AxisTravel{}))
         .map([](auto grid) { return HeldCorrection(std::move(grid)); });
   if (facts.holds == HeldPart::Errors)
     return calib::tables_of_model(model, request.tool_m, request.nodes_m).map([](auto tables) {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/verify/observe.hpp"
 
 namespace abbe::daemon {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/gate.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon {

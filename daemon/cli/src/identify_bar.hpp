@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "abbe/calib/mfb/measurement.hpp"
+#include "abbe/calib/mfb/run/measurement.hpp"
 
 namespace abbe::daemon {
 

@@ -22,7 +22,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/environment/thermal_expansion.hpp"
-#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/evemu/document.hpp"
@@ -292,7 +292,7 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
   command
       .add_option("--order", input.order,
                   "order of the polynomials; default: that of [evemu], or 3")
-      ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder));
+      ->check(CLI::Range(calib::kLeastOrder, calib::kMostOrder));
   command
       .add_option("--positions", input.positions,
                   "required number of artefact positions; default: the requested ones, or 8")

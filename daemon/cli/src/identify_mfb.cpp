@@ -16,7 +16,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/mfb/touches_off.hpp"
+#include "abbe/calib/mfb/run/touches_off.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/mfb/document.hpp"
 #include "abbe/methods/mfb/identification.hpp"
@@ -76,8 +76,8 @@ mfb::Options options_of(const IdentifyMfbArguments& arguments) {
   return options;
 }
 
-/// Bar, plan and touches of a session; nothing is against its pass, because the guide of the session
-/// takes no such touch.
+/// Bar, plan and touches of a session; nothing is against its pass, because the guide of the
+/// session takes no such touch.
 Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());

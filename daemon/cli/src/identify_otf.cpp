@@ -12,10 +12,10 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/other_beams.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/solve/other_beams.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/document.hpp"
@@ -260,7 +260,7 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
       {"hash", model_hash(outcome.document)},
       {"mode", outcome.document.mode},
       {"estimator", outcome.document.estimator},
-      {"tables", calib::estimation::name(*outcome.document.model.interpolation())},
+      {"tables", calib::name(*outcome.document.model.interpolation())},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
       {"blocks", outcome.blocks},
@@ -299,8 +299,7 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& argume
   const std::filesystem::path folder = arguments.out;
   fmt::print("model       {}  ({} {} tables, tool and machine \"{}\")\n",
              model_id(outcome.document), outcome.document.model.tables()->layout().tables().size(),
-             calib::estimation::name(*outcome.document.model.interpolation()),
-             outcome.document.machine);
+             calib::name(*outcome.document.model.interpolation()), outcome.document.machine);
   const bool stands = outcome.document.mode == otf::name(otf::Mode::Standstill);
   fmt::print("samples     {}, {} lost; {} of {} {} used\n", s.samples, s.lost_samples,
              outcome.blocks_used, outcome.blocks, stands ? "standstills" : "blocks");

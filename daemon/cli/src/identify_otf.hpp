@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/model/model_document.hpp"
@@ -64,8 +64,8 @@ struct OtfOutcome {
 /// The options of the command replace those of the configuration; --smoothness apart.
 void apply(const IdentifyOtfArguments& arguments, Config& config);
 
-/// Refuses the model of a run whose points state a place of the tracker that their noise contradicts,
-/// unless the gate accepts it.
+/// Refuses the model of a run whose points state a place of the tracker that their noise
+/// contradicts, unless the gate accepts it.
 void judge_beams(const TrackerFile& points, const calib::otf::Observations& observations,
                  const calib::otf::Solution& solution, const GateConfig& gate,
                  calib::Verdict& verdict);

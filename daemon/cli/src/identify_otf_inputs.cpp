@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "abbe/base/units.hpp"
+#include "abbe/calib/model/backlash.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/tables/travel_faults.hpp"
@@ -27,21 +28,22 @@ double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config) {
 
 void apply(const IdentifyOtfArguments& arguments, Config& config) {
   OtfConfig& otf = config.otf;
-  if (arguments.estimator)
-    otf.estimator = otf::estimator(*arguments.estimator).value_or(otf.estimator);
-  otf.mode = otf::mode_named(arguments.mode).value_or(otf.mode);
-  otf.backlash = otf::backlash_named(arguments.backlash).value_or(otf.backlash);
-  config.machine.interpolation = calib::estimation::table_interpolation(arguments.tables)
-                                     .value_or(config.machine.interpolation);
+  const auto set = [](auto& value, const auto& named) {
+    if (named) value = config_of(*named);
+  };
+  if (arguments.estimator) set(otf.estimator, otf::estimator(*arguments.estimator));
+  set(otf.mode, otf::mode_named(arguments.mode));
+  set(otf.backlash, calib::backlash_named(arguments.backlash));
+  set(config.machine.interpolation, calib::table_interpolation(arguments.tables));
   if (const auto& t = arguments.target_offset_m) set_target(config, *t);
   if (const auto& p = arguments.tracker_position_m)
     config.machine.tracker_position_m = {p->x(), p->y(), p->z()};
 }
 
 Result<void> apply_smoothness(const std::string& text, Config& config) {
-  auto& smoothness = config.otf.smoothness;
+  auto& smoothness_m = config.otf.smoothness_m;
   if (text.empty()) return {};
-  smoothness.reset();
+  smoothness_m.reset();
   if (text == "none") return {};
 
   const bool is_one = text.find(',') == std::string::npos;
@@ -57,7 +59,7 @@ Result<void> apply_smoothness(const std::string& text, Config& config) {
                             "the bend over nodes 50 mm apart in um, 0.01 to 1000: one number, or "
                             "X,Y,Z with 0 for no prior",
                             text));
-  smoothness = otf::SmoothnessOptions{.bend_m = {bend_m[0], bend_m[1], bend_m[2]}};
+  smoothness_m = {bend_m[0], bend_m[1], bend_m[2]};
   return {};
 }
 
@@ -66,8 +68,8 @@ Result<void> check_path(const std::string& file, const PathFile& path, const Con
           check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine);
       !inside)
     return inside;
-  auto valid =
-      check_otf_path(path.vertices_m, config.machine, config.otf.mode, config.otf.backlash);
+  auto valid = check_otf_path(path.vertices_m, config.machine, calib_of(config.otf.mode),
+                              calib_of(config.otf.backlash));
   if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);
   return valid;
 }

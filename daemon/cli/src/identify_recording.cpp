@@ -4,7 +4,7 @@
 #include <utility>
 #include <variant>
 
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/otf/method.hpp"
 #include "abbe/recording/recorded_clock.hpp"
 #include "abbe/replay/replay.hpp"

@@ -7,9 +7,9 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/targets.hpp"
+#include "abbe/calib/otf/identify/targets.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/time_unit.hpp"

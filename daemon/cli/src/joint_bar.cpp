@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "abbe/calib/mfb/reading_mistakes.hpp"
+#include "abbe/calib/mfb/observe/reading_mistakes.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/mfb/identification.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
@@ -62,8 +62,8 @@ void set_aside(std::vector<mfb::PassTouches>& passes,
       touch.set_aside = touch.set_aside || touch.target == wrong.target;
 }
 
-/// The verdict of `identify mfb` on the bar alone; the touches that it finds wrong are excluded. A bar
-/// that determines no model by itself has no reasons, and a note.
+/// The verdict of `identify mfb` on the bar alone; the touches that it finds wrong are excluded. A
+/// bar that determines no model by itself has no reasons, and a note.
 calib::Verdict verdict_of_bar(MfbTask& task, const Config& config) {
   const auto found = identify_with_bar(task, config, nullptr);
   if (!found) return {.notes = {"not judged by itself: " + found.error().text}};

@@ -6,8 +6,8 @@
 
 namespace abbe::daemon {
 
-/// Reads the files of the bar, identifies and judges the bar alone as `identify mfb` does, which also
-/// excludes wrong touches, and adds its part. `input` has the tables of the first run. Errors
+/// Reads the files of the bar, identifies and judges the bar alone as `identify mfb` does, which
+/// also excludes wrong touches, and adds its part. `input` has the tables of the first run. Errors
 /// without the name of the part: Io, BadInput with file and line, DataInsufficient.
 [[nodiscard]] Result<void> add_bar(const IdentifyJointArguments&, const BarFiles&, JointInput&);
 

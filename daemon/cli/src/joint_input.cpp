@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "abbe/base/sha256.hpp"
-#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/tables/parts_file.hpp"
@@ -61,8 +61,8 @@ IdentifyOtfArguments arguments_of(const IdentifyJointArguments& all, const RunFi
 }
 
 /// The offset of the ranges that the run shares with others.
-Result<std::optional<calib::joint::SharedRangeOffset>> shared_offset(
-    const RunFiles& files, const calib::otf::Solution& solution) {
+Result<std::optional<calib::TrackerPlace>> shared_offset(const RunFiles& files,
+                                                         const calib::otf::Solution& solution) {
   if (files.range_offset.empty()) return std::nullopt;
   if (!solution.offset_in_model)
     return fail(
@@ -70,7 +70,7 @@ Result<std::optional<calib::joint::SharedRangeOffset>> shared_offset(
         fmt::format("{}: range_offset = \"{}\" needs u_range_offset_um > 0 of the tracker, and a "
                     "run without reference nests: otherwise the offset is not estimated",
                     files.name, files.range_offset));
-  return calib::joint::SharedRangeOffset{files.range_offset, *solution.offset_in_model};
+  return calib::TrackerPlace{files.range_offset, *solution.offset_in_model};
 }
 
 /// Notes every run with a range_offset that no other run has.
@@ -140,7 +140,7 @@ Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& fi
   const calib::joint::CommonEffects effects{.u_ranges = run->noise.u_scale,
                                             .ranges_of = files.instrument,
                                             .u_axis_scale = run->noise.u_axis_scale,
-                                            .range_offset = *offset};
+                                            .place = *offset};
   auto part = calib::joint::part_of_run(files.name, solution.model, *input.common, effects);
   if (!part) return tl::make_unexpected(error_of(part.error()));
 
@@ -217,12 +217,12 @@ Result<void> add_array(const IdentifyJointArguments& arguments, const ArrayFiles
 Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, ProgressBar& bar) {
   auto config = load_config(arguments.machine);
   if (!config) return tl::make_unexpected(config.error());
-  if (config->otf.backlash != calib::estimation::TravelDependence::None)
+  if (config->otf.backlash != OtfBacklash::None)
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: otf.backlash: must be \"none\" for identify joint: half the "
                             "backlash is in the uncertainty of every run and does not average out",
                             arguments.machine));
-  if (config->otf.smoothness)
+  if (config->otf.smoothness_m)
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: otf.smoothness_um: must not be given for identify joint: every "
                             "run would contain the prior, and all together would count it once "

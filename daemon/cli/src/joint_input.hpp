@@ -9,8 +9,8 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/gate.hpp"
 #include "abbe/calib/joint/judge.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/config/config.hpp"
 #include "terminal.hpp"
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/lack_of_fit.hpp"
+#include "abbe/calib/otf/judge/lack_of_fit.hpp"
 #include "abbe/report/sections.hpp"
 #include "identified_model.hpp"
 

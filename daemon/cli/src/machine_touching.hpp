@@ -1,15 +1,15 @@
 #pragma once
-/// Touches by the measuring machine of the running daemon: requests them and follows their progress.
-/// The machine must not move unsupervised. Therefore this program cancels the touching after a
-/// signal or when the daemon does not answer. The daemon itself cancels the touching if no client
-/// requests the progress for 2 s.
+/// Touches by the measuring machine of the running daemon: requests them and follows their
+/// progress. The machine must not move unsupervised. Therefore this program cancels the touching
+/// after a signal or when the daemon does not answer. The daemon itself cancels the touching if no
+/// client requests the progress for 2 s.
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/machine_touches.hpp"
+#include "abbe/calib/geometry/machine_touches.hpp"
 
 namespace abbe::daemon {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 
 namespace abbe::daemon {
 
@@ -18,8 +18,8 @@ struct MeasuredOptions {
 /// Adds --measured and its options; returns --measured.
 CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options);
 
-/// Prints the comparison as text or as one JSON object. The exit code: 5 if a table contradicts; 1 if
-/// no table could be tested, or if single values do not fit the others; else 0.
+/// Prints the comparison as text or as one JSON object. The exit code: 5 if a table contradicts; 1
+/// if no table could be tested, or if single values do not fit the others; else 0.
 [[nodiscard]] Result<int> compare_with_measured(const calib::VolumetricModel& model,
                                                 const MeasuredOptions& options, bool as_json);
 

@@ -10,7 +10,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "commands.hpp"
 #include "direction_option.hpp"
 #include "figures.hpp"

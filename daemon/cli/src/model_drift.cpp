@@ -10,7 +10,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/model_drift.hpp"
+#include "abbe/calib/model/model_drift.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "commands.hpp"
 #include "same_machine.hpp"

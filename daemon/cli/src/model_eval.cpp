@@ -27,7 +27,7 @@ struct ModelEvalArguments {
 /// One row of the output: position, error V or correction, its standard uncertainty, inside. The
 /// correction is a function of V and has the same uncertainty.
 Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition& q,
-                        const calib::Vector3& tool_m, const calib::estimation::AxisTravel& travel,
+                        const calib::Vector3& tool_m, const calib::AxisTravel& travel,
                         bool correction) {
   const calib::Vector3 position_m(q[0], q[1], q[2]);
   const auto error = model.error_at(position_m, tool_m, travel);
@@ -51,9 +51,9 @@ Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition&
 }
 
 /// The direction of travel at each point: of --direction, of the columns of points.csv, or unknown.
-Result<std::vector<calib::estimation::AxisTravel>> travel_of(const ModelEvalArguments& arguments,
-                                                             const PointsFile& points,
-                                                             const calib::VolumetricModel& model) {
+Result<std::vector<calib::AxisTravel>> travel_of(const ModelEvalArguments& arguments,
+                                                 const PointsFile& points,
+                                                 const calib::VolumetricModel& model) {
   const auto given = parse_direction(arguments.direction);
   if (!given) return tl::make_unexpected(given.error());
   const bool of_points = !points.travel.empty();

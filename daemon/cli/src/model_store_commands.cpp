@@ -10,6 +10,7 @@
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/calib/model/backlash.hpp"
 #include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/stored_model.hpp"
 #include "commands.hpp"
@@ -110,7 +111,7 @@ void print_model(const ModelDocument& document) {
   if (document.model.travel() != nullptr)
     fmt::print(
         "travel      V depends on the direction of travel ({}): abbe model eval --direction\n",
-        calib::otf::backlash_name(document.model.travel()->kind));
+        calib::backlash_name(document.model.travel()->kind));
   fmt::print("\n{}", to_tables_csv(document.model, document.backlash));
 }
 

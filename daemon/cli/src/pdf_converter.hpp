@@ -8,7 +8,8 @@
 
 namespace abbe::daemon {
 
-/// Writes `pdf`. Io if no converter is installed, or if it fails or takes longer than three minutes.
+/// Writes `pdf`. Io if no converter is installed, or if it fails or takes longer than three
+/// minutes.
 [[nodiscard]] Result<void> write_pdf(const std::string& html, const std::filesystem::path& pdf);
 
 }  // namespace abbe::daemon

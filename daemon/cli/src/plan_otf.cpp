@@ -18,10 +18,10 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/plan.hpp"
-#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/calib/otf/plan/plan.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/path_plan.hpp"
@@ -100,7 +100,7 @@ Result<otf::PlannedRun> run_of(const PlanOtfArguments& arguments, const Config& 
   const auto machine = otf_machine(config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
   otf::PlannedRun run{.machine = *machine, .noise = otf_noise(config.machine)};
-  run.backlash = config.otf.backlash;
+  run.backlash = calib_of(config.otf.backlash);
   run.drive = arguments.drive;
   run.drive.feed_m_per_s = arguments.feed_mm_per_min / kMmPerM / kMinute_s;
   if (const auto tracker = tracker_source(config); tracker)

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/mfb/plan.hpp"
+#include "abbe/calib/mfb/plan/plan.hpp"
 #include "abbe/methods/mfb/bar_plan.hpp"
 #include "terminal.hpp"
 

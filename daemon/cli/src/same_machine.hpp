@@ -1,6 +1,6 @@
 #pragma once
-/// The difference of models of two machines says nothing about either of them. Commands that compare
-/// models refuse such a pair, unless --other-machine states that it is meant.
+/// The difference of models of two machines says nothing about either of them. Commands that
+/// compare models refuse such a pair, unless --other-machine states that it is meant.
 
 #include <CLI/App.hpp>
 #include <span>
@@ -15,8 +15,8 @@ struct OfMachine {
   std::string what;  ///< for people: "a.json", "run.mcap"
   std::string machine;
 };
-/// The machine of a model: the name in its configuration; of a model from the data folder of another
-/// machine, with a remark.
+/// The machine of a model: the name in its configuration; of a model from the data folder of
+/// another machine, with a remark.
 [[nodiscard]] OfMachine of_machine(const std::string& name, const FoundModel& model);
 
 void add_other_machine_option(CLI::App& command, bool& other_machine);

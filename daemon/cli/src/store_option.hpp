@@ -30,7 +30,8 @@ void add_store_options(CLI::App& command, StoreOption& where);
 /// machine_hash() of the abbed.toml of -c; nullopt without -c.
 [[nodiscard]] Result<std::optional<std::string>> machine_hash_of(const StoreOption& where);
 
-/// The file of a model: `name` itself if it is a path, else that in the store; empty if there is none.
+/// The file of a model: `name` itself if it is a path, else that in the store; empty if there is
+/// none.
 [[nodiscard]] std::filesystem::path file_of_model(const std::string& name,
                                                   const StoreOption& where);
 

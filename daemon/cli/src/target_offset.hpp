@@ -1,7 +1,7 @@
 #pragma once
 /// The target offset of one measurement, where an input file states it for this measurement.
 
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 #include "abbe/config/config.hpp"
 
 namespace abbe::daemon {

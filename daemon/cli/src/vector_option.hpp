@@ -4,7 +4,7 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 
 namespace abbe::daemon {
 

@@ -364,8 +364,8 @@ int run_several(const VerifyArguments& arguments) {
   return points->cut_short ? report(*points->cut_short) : code;
 }
 
-/// The given option that has no effect with several models; empty: none. With --live, -o is the folder
-/// of the collected points.
+/// The given option that has no effect with several models; empty: none. With --live, -o is the
+/// folder of the collected points.
 std::string only_for_one_model(const VerifyArguments& arguments) {
   if (arguments.models.size() < 2) return {};
   if (!arguments.out.empty() && !arguments.live) return "-o (report.html, grid.csv)";

@@ -27,15 +27,15 @@ struct SeveralOptions {
 };
 
 /// Reads the models; `tool`: x,y,z in mm, or empty for the tool of each model. Errors of
-/// model_named() and tool_of(). Usage: different tool offsets without `tool`: the points were measured
-/// with one.
+/// model_named() and tool_of(). Usage: different tool offsets without `tool`: the points were
+/// measured with one.
 [[nodiscard]] Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& names,
                                                            const StoreOption& store,
                                                            const std::string& tool);
 
 /// Prints one row per model: residual errors at those places that are inside the validity volume of
-/// all models, without and with the model. Returns the exit code: Worse if the errors are larger with
-/// one of the models. DataInsufficient: fewer than 4 such places.
+/// all models, without and with the model. Returns the exit code: Worse if the errors are larger
+/// with one of the models. DataInsufficient: fewer than 4 such places.
 [[nodiscard]] Result<int> verify_several(const std::vector<NamedModel>& models,
                                          const calib::verify::Observations& observed,
                                          const SeveralOptions& options);

@@ -38,8 +38,8 @@ struct ConfigKind {
   /// Adds with ClassifiedSection::state() what keys of the kind mean together with other tables.
   /// All tables have been read.
   void (*state)(ClassifiedSection& root, const Config& config) = nullptr;
-  /// Reports each value that is possible but improbable with Section::fault(). check_config() prints
-  /// these faults as warnings.
+  /// Reports each value that is possible but improbable with Section::fault(). check_config()
+  /// prints these faults as warnings.
   void (*doubt)(Section& root, const Config& config) = nullptr;
   /// The lines about the devices of this kind in `abbed --check-config`, one for each device.
   std::vector<std::string> (*summary)(const Config& config);

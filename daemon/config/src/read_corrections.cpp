@@ -53,10 +53,10 @@ void read_air(ClassifiedSection& root, Config& out) {
   AirConfig& config = out.air;
   // Without assumed_index the index is only shown.
   const Role index = air.has("assumed_index") ? Role::Measurement : Role::Operation;
-  air.get_word<calib::IndexEquation>(Key{"equation", index}, config.equation,
-                                     {{"ciddor", calib::IndexEquation::Ciddor},
-                                      {"edlen", calib::IndexEquation::Edlen},
-                                      {"shop_floor", calib::IndexEquation::ShopFloor}});
+  air.get_word<AirEquation>(Key{"equation", index}, config.equation,
+                            {{"ciddor", AirEquation::Ciddor},
+                             {"edlen", AirEquation::Edlen},
+                             {"shop_floor", AirEquation::ShopFloor}});
   air.get(Key{"wavelength_nm", index}, config.wavelength_m, kNano, {350.0, 1200.0});
   air.get(Key{"co2_ppm", index}, config.co2_ppm, kPlain, {0.0, 2000.0});
   air.get(operation("u_temperature_K"), config.u_temperature_K, kPlain, {0.0, 10.0});

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "abbe/calib/evemu/judge.hpp"
-#include "abbe/calib/mfb/judge.hpp"
-#include "abbe/calib/otf/orientation.hpp"
-#include "abbe/calib/otf/other_beams.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
+#include "abbe/calib/mfb/judge/judge.hpp"
+#include "abbe/calib/otf/observe/orientation.hpp"
+#include "abbe/calib/otf/solve/other_beams.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {

@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/error_parameters.hpp"
+#include "abbe/calib/geometry/error_parameters.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -26,11 +26,11 @@ void read_drift(ClassifiedSection& root, Config& out) {
   section.get("place_days", drift.place_days, kPlain, kPositive);
   if (drift.continuous && !drift.test)
     section.fault("continuous", "needs test = true: a table that drifted must not be averaged");
-  if (drift.continuous && out.otf.backlash != calib::estimation::TravelDependence::None)
+  if (drift.continuous && out.otf.backlash != OtfBacklash::None)
     section.fault("continuous",
                   "needs backlash = \"none\" in [otf]: half the backlash is in the uncertainty of "
                   "every run, and an update would take it for noise that averages out");
-  if (drift.continuous && out.otf.smoothness)
+  if (drift.continuous && out.otf.smoothness_m)
     section.fault("continuous",
                   "needs [otf] without smoothness_um: every run would contain the prior, and an "
                   "update would count it once for each of them");

@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/evemu/scaled_design.hpp"
-#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
+#include "abbe/calib/geometry/scaled_design.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "readers.hpp"
 
@@ -73,7 +73,7 @@ void read_evemu(ClassifiedSection& root, Config& out) {
         fmt::format("\"{}\": must be bayes-pose, ols, ridge, lasso, mcp or scad", evemu.estimator));
   if (section.get("folds", evemu.folds) && !calib::evemu::folds_by(evemu.folds))
     section.fault("folds", fmt::format("\"{}\": must be position, ball or row", evemu.folds));
-  section.get_integer("order", evemu.order, calib::evemu::kLeastOrder, calib::evemu::kMostOrder);
+  section.get_integer("order", evemu.order, calib::kLeastOrder, calib::kMostOrder);
   read_positions(section, evemu.positions);
   const calib::evemu::ObserveOptions least;
   section.get_integer("points_per_ball", evemu.points_per_ball,

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <tuple>
 
-#include "abbe/calib/axis_table.hpp"
-#include "abbe/calib/kinematic_chain.hpp"
-#include "abbe/calib/parameter_layout.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/calib/geometry/axis_table.hpp"
+#include "abbe/calib/geometry/kinematic_chain.hpp"
+#include "abbe/calib/geometry/parameter_layout.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "message_bounds.hpp"
 #include "plausible.hpp"
 #include "readers.hpp"
@@ -107,8 +107,8 @@ void read_axis_nodes(ClassifiedSection& model, ClassifiedSection& nodes, Classif
 }
 
 void check_cubic_nodes(ClassifiedSection& model, const MachineConfig& config) {
-  if (config.interpolation == calib::estimation::Interpolation::Linear) return;
-  constexpr std::size_t kMost = calib::estimation::AxisInterpolation::kMostCubicNodes;
+  if (config.interpolation == TableInterpolation::Linear) return;
+  constexpr std::size_t kMost = calib::AxisInterpolation::kMostCubicNodes;
   for (const auto& [axis, nodes_m] : config.nodes_m)
     if (nodes_m.size() > kMost)
       model.fault("basis", fmt::format("axis {} has {} nodes, cubic tables have at most {}", axis,
@@ -116,11 +116,11 @@ void check_cubic_nodes(ClassifiedSection& model, const MachineConfig& config) {
 }
 
 void read_model(ClassifiedSection model, const toml::node* spacing_node, MachineConfig& out) {
-  using calib::estimation::Interpolation;
-  model.get_word<Interpolation>(operation("basis"), out.interpolation,
-                                {{calib::kLinearBasis, Interpolation::Linear},
-                                 {calib::kCubicBasis, Interpolation::NaturalCubic},
-                                 {calib::kNotAKnotCubicBasis, Interpolation::NotAKnotCubic}});
+  model.get_word<TableInterpolation>(
+      operation("basis"), out.interpolation,
+      {{calib::kLinearBasis, TableInterpolation::Linear},
+       {calib::kCubicBasis, TableInterpolation::NaturalCubic},
+       {calib::kNotAKnotCubicBasis, TableInterpolation::NotAKnotCubic}});
   ClassifiedSection nodes = model.child("nodes_mm");
   std::optional<ClassifiedSection> spacing;
   if (spacing_node != nullptr && spacing_node->is_table()) spacing = model.child("node_spacing_mm");

@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <array>
+#include <optional>
 
+#include "abbe/calib/otf/run/smoothness_options.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -8,7 +11,7 @@ namespace {
 enum class SmoothnessWord { None };
 
 /// smoothness = "none", or smoothness_um = [X, Y, Z].
-void read_smoothness(Section& section, std::optional<calib::otf::SmoothnessOptions>& out) {
+void read_smoothness(Section& section, std::optional<std::array<double, 3>>& out_m) {
   SmoothnessWord word = SmoothnessWord::None;
   std::vector<double> bend_m;
   const bool has_word =
@@ -29,27 +32,24 @@ void read_smoothness(Section& section, std::optional<calib::otf::SmoothnessOptio
                   "must be three numbers, for X, Y and Z, each 0.01 to 1000, or 0 for no prior");
     return;
   }
-  out = calib::otf::SmoothnessOptions{};
-  std::ranges::copy(bend_m, out->bend_m.begin());
+  out_m = {bend_m[0], bend_m[1], bend_m[2]};
 }
 
 }  // namespace
 
 void read_otf(ClassifiedSection& root, OtfConfig& out) {
   Section section = root.operation_table("otf");
-  section.get_word<calib::otf::Mode>(
-      "mode", out.mode,
-      {{"on-the-fly", calib::otf::Mode::OnTheFly}, {"standstill", calib::otf::Mode::Standstill}});
+  section.get_word<OtfMode>(
+      "mode", out.mode, {{"on-the-fly", OtfMode::OnTheFly}, {"standstill", OtfMode::Standstill}});
   section.get("u_repeatability_um", out.u_repeatability_m, kMicro, {0.0, 1000.0});
-  section.get_word<calib::otf::Estimator>(
+  section.get_word<OtfEstimator>(
       "estimator", out.estimator,
-      {{"two-step", calib::otf::Estimator::TwoStep}, {"joint", calib::otf::Estimator::Joint}});
-  section.get_word<calib::estimation::TravelDependence>(
-      "backlash", out.backlash,
-      {{"none", calib::estimation::TravelDependence::None},
-       {"per-table", calib::estimation::TravelDependence::Backlash},
-       {"forward-backward", calib::estimation::TravelDependence::Tables}});
-  read_smoothness(section, out.smoothness);
+      {{"two-step", OtfEstimator::TwoStep}, {"joint", OtfEstimator::Joint}});
+  section.get_word<OtfBacklash>("backlash", out.backlash,
+                                {{"none", OtfBacklash::None},
+                                 {"per-table", OtfBacklash::PerTable},
+                                 {"forward-backward", OtfBacklash::PerNode}});
+  read_smoothness(section, out.smoothness_m);
   section.close();
 }
 

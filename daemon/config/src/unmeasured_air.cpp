@@ -3,18 +3,19 @@
 #include <fmt/format.h>
 
 #include "abbe/base/units.hpp"
+#include "abbe/calib/environment/refractive_index.hpp"
 #include "abbe/config/capabilities.hpp"
 
 namespace abbe::daemon {
 
-calib::Air assumed_air() noexcept {
-  return {.temperature_K = 293.15, .pressure_Pa = 101'325.0, .relative_humidity = 0.5};
-}
-
 double u_of_unmeasured_air() noexcept {
   // The result always has a value: assumed_air() is within the range of the equation.
+  constexpr AssumedAir air;
   static const double u =
-      *calib::u_of_assumed_air(assumed_air(), calib::kHeliumNeon_m, calib::IndexEquation::Ciddor);
+      *calib::u_of_assumed_air({.temperature_K = air.temperature_K,
+                                .pressure_Pa = air.pressure_Pa,
+                                .relative_humidity = air.relative_humidity},
+                               calib::kHeliumNeon_m, calib::IndexEquation::Ciddor);
   return u;
 }
 
@@ -22,7 +23,7 @@ std::optional<std::string> unmeasured_air_text(const Config& config, double u_sc
   const auto tracker = tracker_source(config);
   const bool measured = !tracker || tracker->air == TrackerSource::Air::Measured;
   if (measured || config.air.assumed_index) return std::nullopt;
-  const calib::Air air = assumed_air();
+  const AssumedAir air = assumed_air();
   const std::string corrected_for =
       tracker->air == TrackerSource::Air::Assumed
           ? fmt::format("air not measured: the ranges are corrected for {:g} C, {:g} hPa, {:g} %",

@@ -91,8 +91,9 @@ void log_source_change(const DdsBridge& bridge, bool& alive) {
                              : "abbe-dds: no data from abbed: ModelState INVALID is published\n");
 }
 
-/// The configuration as abbe-dds.service passes it on (LoadCredential=), because the user of abbe-dds
-/// may not read it; else the file itself. Its paths are relative to the folder of `file` either way.
+/// The configuration as abbe-dds.service passes it on (LoadCredential=), because the user of
+/// abbe-dds may not read it; else the file itself. Its paths are relative to the folder of `file`
+/// either way.
 abbe::daemon::Result<abbe::daemon::Config> configuration_of(const std::string& file) {
   const char* const credentials = std::getenv("CREDENTIALS_DIRECTORY");
   const auto passed_on =

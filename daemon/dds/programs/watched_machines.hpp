@@ -1,6 +1,6 @@
 #pragma once
-/// The display of abbe-watch: what participants published about each machine, and the lines that are
-/// printed when it changes. Used by one thread.
+/// The display of abbe-watch: what participants published about each machine, and the lines that
+/// are printed when it changes. Used by one thread.
 
 #include <chrono>
 #include <cstddef>
@@ -36,8 +36,8 @@ class WatchedMachines {
   [[nodiscard]] bool received() const { return received_; }
   void take(const Arrival& arrival);
   /// Discards the ModelState of each publisher that is not alive, and shows the change. A publisher
-  /// that becomes alive again repeats its ModelState within a second. Withdraws the decision to apply
-  /// the last vector when it is no longer true, also when nothing arrives any more.
+  /// that becomes alive again repeats its ModelState within a second. Withdraws the decision to
+  /// apply the last vector when it is no longer true, also when nothing arrives any more.
   void notice_losses();
   /// When the next of these vectors becomes older than its validity, at most `at_most` from now.
   [[nodiscard]] std::chrono::milliseconds until_next_loss(std::chrono::milliseconds at_most) const;

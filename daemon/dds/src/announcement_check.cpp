@@ -10,8 +10,8 @@ namespace {
 
 using namespace rtps_message;
 
-/// Longest announcement: those of abbe have less than 1 kB, with a TypeObject several. A stranger may
-/// announce thousands, with user data that is kept.
+/// Longest announcement: those of abbe have less than 1 kB, with a TypeObject several. A stranger
+/// may announce thousands, with user data that is kept.
 constexpr std::size_t kLongestAnnouncement = 16384;
 /// Parameter of a participant: how long it counts as alive without a message. Three times the
 /// longest interval of announcements that is usual (30 s): a participant that announced an endless

@@ -1,6 +1,6 @@
 #pragma once
-/// The list of parameters with which a participant announces itself, a writer or a reader. Comes before
-/// any key is checked. Pure.
+/// The list of parameters with which a participant announces itself, a writer or a reader. Comes
+/// before any key is checked. Pure.
 
 #include "submessage.hpp"
 

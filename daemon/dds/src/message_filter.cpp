@@ -47,8 +47,9 @@ bool announces_endpoint(std::uint32_t writer) {
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;
 }
 
-/// Whether Fast DDS can calculate with the sequence number at `at`: it asserts that the high word is
-/// not the largest. A writer that sends a million samples a second reaches kMost in 146,000 years.
+/// Whether Fast DDS can calculate with the sequence number at `at`: it asserts that the high word
+/// is not the largest. A writer that sends a million samples a second reaches kMost in 146,000
+/// years.
 bool is_countable(const Submessage& submessage, std::size_t at) {
   constexpr std::uint64_t kMost = std::uint64_t{1} << 62;
   return at + 8 <= submessage.body.size() && submessage.reader().sequence_number(at) < kMost;
@@ -179,8 +180,8 @@ void add_to(Reassembly& reassembly, const Submessage& fragment) {
 /// Only the messages of DDS Security before it encrypts may be fragments: a message of abbe fits
 /// into one DATA submessage, and Fast DDS checks fragments insufficiently: without a payload behind
 /// their inline QoS it frees memory that is not its own. Those of authentication are reassembled
-/// and then checked. A fragment of an announcement cannot be checked alone; a GAP of its number lets
-/// the reader go on to later announcements.
+/// and then checked. A fragment of an announcement cannot be checked alone; a GAP of its number
+/// lets the reader go on to later announcements.
 void check_fragment(const Submessage& fragment) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kFragmentsAt = 20, kShortest = 32;
   const Bytes body = fragment.body;
@@ -243,8 +244,8 @@ void limit_heartbeat(const Submessage& heartbeat) {
   if (allowed < first - next) reader.put_sequence_number(kFirstAt, next + allowed);
 }
 
-/// Fast DDS delivers to the reader that a submessage names, also from an unknown writer: the content
-/// would be checked as that of another writer.
+/// Fast DDS delivers to the reader that a submessage names, also from an unknown writer: the
+/// content would be checked as that of another writer.
 bool is_for_its_reader(const Submessage& submessage) {
   const bool is_data = submessage.kind == kData || submessage.kind == kDataFrag;
   const bool is_of_writer = is_data || submessage.kind == kHeartbeat || submessage.kind == kGap ||

@@ -14,8 +14,9 @@ namespace abbe::dds {
 /// Follows the submessages of one message from the first to the last.
 class ProtectedStructure {
  public:
-  /// `first` of the message. `open`: the length is 0, "up to the end". Returns whether the submessage
-  /// is protected: Fast DDS drops it if its signature is wrong. nullopt: the structure is wrong.
+  /// `first` of the message. `open`: the length is 0, "up to the end". Returns whether the
+  /// submessage is protected: Fast DDS drops it if its signature is wrong. nullopt: the structure
+  /// is wrong.
   [[nodiscard]] std::optional<bool> next(std::uint8_t kind, std::span<const std::uint8_t> body,
                                          bool first, bool open);
   /// What began has ended.

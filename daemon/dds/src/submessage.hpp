@@ -1,5 +1,6 @@
 #pragma once
-/// A submessage of an RTPS message, as the filter reads and changes it [DDSI-RTPS 2.5, 8.3.7, 9.4.5].
+/// A submessage of an RTPS message, as the filter reads and changes it [DDSI-RTPS 2.5, 8.3.7,
+/// 9.4.5].
 
 #include <cstddef>
 #include <cstdint>
@@ -66,8 +67,8 @@ struct DataLayout {
   bool not_alive = false;   ///< the status says disposed or unregistered
 };
 
-/// Finds the payload, and blanks the key hash of a user's sample. nullopt if the submessage does not
-/// conform to the standard: Fast DDS could read its parameters at another offset.
+/// Finds the payload, and blanks the key hash of a user's sample. nullopt if the submessage does
+/// not conform to the standard: Fast DDS could read its parameters at another offset.
 [[nodiscard]] std::optional<DataLayout> read_data(const Submessage& data, bool users);
 
 }  // namespace abbe::dds::rtps_message

@@ -21,8 +21,8 @@ class MachineHoldWriter {
 
   /// `in_file`: the state in the file; nullopt: not known, so that the first state is written.
   MachineHoldWriter(std::filesystem::path file, std::optional<drivers::IppMachine> in_file);
-  /// Waits until the latest state is written, or cannot be, at most kEndTimeout. A state that is not
-  /// written by then is reported on stderr.
+  /// Waits until the latest state is written, or cannot be, at most kEndTimeout. A state that is
+  /// not written by then is reported on stderr.
   ~MachineHoldWriter();
   MachineHoldWriter(const MachineHoldWriter&) = delete;
   MachineHoldWriter& operator=(const MachineHoldWriter&) = delete;

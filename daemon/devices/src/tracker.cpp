@@ -30,7 +30,7 @@ WeatherMonitor weather_monitor(WeatherConfig weather) {
   return WeatherMonitor::None;
 }
 
-protocol::emscon::Environment controller_units(const calib::Air& air) {
+protocol::emscon::Environment controller_units(const AssumedAir& air) {
   return {.temperature = air.temperature_K - kZeroCelsius_K,
           .pressure = air.pressure_Pa * 1e-2,  // mbar
           .humidity = air.relative_humidity * 1e2};

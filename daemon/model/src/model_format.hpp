@@ -3,8 +3,8 @@
 
 #include <string_view>
 
-#include "abbe/calib/error_parameters.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/geometry/error_parameters.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 
 namespace abbe::daemon {
 
@@ -22,7 +22,7 @@ inline constexpr int kMicroUnitSquared = 12;  // their products
 /// `basis.kind` of model.json: for tables the name of their interpolation, else kLegendre.
 [[nodiscard]] inline std::string_view basis_kind(const calib::VolumetricModel& model) {
   const auto interpolation = model.interpolation();
-  return interpolation ? calib::estimation::name(*interpolation) : kLegendre;
+  return interpolation ? calib::name(*interpolation) : kLegendre;
 }
 
 /// Tables: their nodes; polynomials: the grid at which they are checked.

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "abbe/base/sha256.hpp"
+#include "abbe/calib/model/backlash.hpp"
 #include "abbe/model/model_document.hpp"
 #include "model_format.hpp"
 
@@ -87,7 +88,7 @@ void add_artefact(Canonical& out, const calib::Expansion& artefact) {
 /// Only if V depends on the direction of travel: other models have the hash of earlier versions.
 void add_travel(Canonical& out, const calib::TravelDifferences& travel) {
   out.text("travel");
-  out.text(calib::otf::backlash_name(travel.kind));
+  out.text(calib::backlash_name(travel.kind));
   out.count(static_cast<std::size_t>(travel.D.size()));
   for (Eigen::Index i = 0; i < travel.D.size(); ++i) {
     out.number(travel.D[i]);

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 #include "decimal.hpp"
 #include "model_format.hpp"
 

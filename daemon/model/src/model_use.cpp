@@ -27,8 +27,8 @@ const StoreEvent* drift_of(std::span<const StoreEvent> events) {
 }
 
 /// A model that was not judged is not refused: files of earlier versions stay usable, and what is
-/// made of them states that nobody judged them. `abbe model activate` does refuse it, because a store
-/// has the verdict of every model that abbe added.
+/// made of them states that nobody judged them. `abbe model activate` does refuse it, because a
+/// store has the verdict of every model that abbe added.
 void add_verdict(const ModelInUse& use, Obstacles& out) {
   const auto& verdict = use.document.verdict;
   const std::string text = "verdict: " + in_one_line(verdict);
@@ -43,8 +43,8 @@ bool accepted_for(std::span<const StoreEvent> events, const std::string& machine
   return last != events.rend() && last->accepted_configuration == machine_hash;
 }
 
-/// Nobody signs a certificate of a machine that does not exist. A control file of such a model may be
-/// for a simulated control; it states where the model comes from.
+/// Nobody signs a certificate of a machine that does not exist. A control file of such a model may
+/// be for a simulated control; it states where the model comes from.
 void add_simulated(const ModelInUse& use, Obstacles& out) {
   if (!made_on_simulated_devices(use.document).value_or(false)) return;
   auto& list = use.purpose == ModelPurpose::Certificate ? out.refusals : out.statements;

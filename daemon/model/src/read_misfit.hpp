@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "abbe/calib/misfit.hpp"
+#include "abbe/calib/model/misfit.hpp"
 #include "model_reader.hpp"
 
 namespace abbe::daemon {

@@ -50,7 +50,7 @@ void read_basis(ModelReader& in, calib::ModelDescription& out) {
   const ModelJson* kind = in.find(*basis, "basis", "kind");
   if (kind != nullptr && *kind == kLegendre) return read_polynomials(in, *basis, out);
   const auto interpolation = kind != nullptr && kind->is_string()
-                                 ? calib::estimation::table_interpolation(kind->get<std::string>())
+                                 ? calib::table_interpolation(kind->get<std::string>())
                                  : std::nullopt;
   if (kind != nullptr && !interpolation)
     in.fault(

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "abbe/calib/offset_in_model.hpp"
+#include "abbe/calib/model/offset_in_model.hpp"
 #include "model_reader.hpp"
 
 namespace abbe::daemon {

@@ -1,4 +1,5 @@
 #include "read_travel.hpp"
+#include "abbe/calib/model/backlash.hpp"
 
 #include <fmt/format.h>
 
@@ -8,8 +9,7 @@ namespace abbe::daemon {
 
 namespace {
 
-calib::otf::Backlash read_difference(ModelReader& in, const ModelJson& entry,
-                                     const std::string& path) {
+calib::Backlash read_difference(ModelReader& in, const ModelJson& entry, const std::string& path) {
   const ModelJson* name = in.find(entry, path, "name");
   const auto motion = name != nullptr && name->is_string()
                           ? calib::error_motion(name->get<std::string>())
@@ -19,18 +19,18 @@ calib::otf::Backlash read_difference(ModelReader& in, const ModelJson& entry,
   if (unit != nullptr && motion && *unit != unit_of(*motion))
     in.fault(path + ".unit", fmt::format("must be \"{}\"", unit_of(*motion)));
 
-  calib::otf::Backlash b{.motion = motion.value_or(calib::ErrorMotion{}),
-                         .value = in.number_of(entry, path, "value", kMicroUnit),
-                         .u = in.number_of(entry, path, "u", kMicroUnit),
-                         .determined = true};
+  calib::Backlash b{.motion = motion.value_or(calib::ErrorMotion{}),
+                    .value = in.number_of(entry, path, "value", kMicroUnit),
+                    .u = in.number_of(entry, path, "u", kMicroUnit),
+                    .determined = true};
   if (entry.is_object() && entry.contains("position_mm"))
     b.position_m = in.number_of(entry, path, "position_mm", kMm);
   return b;
 }
 
-std::vector<calib::otf::Backlash> read_differences(ModelReader& in, const ModelJson& list,
-                                                   const std::string& path) {
-  std::vector<calib::otf::Backlash> all;
+std::vector<calib::Backlash> read_differences(ModelReader& in, const ModelJson& list,
+                                              const std::string& path) {
+  std::vector<calib::Backlash> all;
   if (!list.is_array()) in.fault(path, "must be an array");
   for (std::size_t i = 0; list.is_array() && i < list.size(); ++i)
     all.push_back(read_difference(in, list[i], fmt::format("{}[{}]", path, i)));
@@ -59,7 +59,7 @@ void read_travel_covariance(ModelReader& in, const ModelJson& travel, Eigen::Ind
   }
 }
 
-bool is_same_place(const calib::otf::Backlash& a, const calib::otf::Backlash& b) {
+bool is_same_place(const calib::Backlash& a, const calib::Backlash& b) {
   constexpr double kSameNode_m = 1e-9;  // decimal numbers in mm differ by rounding
   return a.motion == b.motion && a.position_m.has_value() == b.position_m.has_value() &&
          (!a.position_m || std::abs(*a.position_m - *b.position_m) < kSameNode_m);
@@ -67,7 +67,7 @@ bool is_same_place(const calib::otf::Backlash& a, const calib::otf::Backlash& b)
 
 }  // namespace
 
-std::vector<calib::otf::Backlash> read_backlash(ModelReader& in) {
+std::vector<calib::Backlash> read_backlash(ModelReader& in) {
   const std::string path = "backlash";
   if (!in.root().is_object() || !in.root().contains(path)) return {};
   return read_differences(in, in.root().at(path), path);
@@ -79,13 +79,13 @@ std::optional<StoredTravel> read_travel(ModelReader& in, std::size_t parameters)
   const ModelJson& travel = in.root().at(path);
   const ModelJson* kind = in.find(travel, path, "kind");
   const auto known = kind != nullptr && kind->is_string()
-                         ? calib::otf::backlash_named(kind->get<std::string>())
+                         ? calib::backlash_named(kind->get<std::string>())
                          : std::nullopt;
-  if (!known || *known == calib::estimation::TravelDependence::None)
+  if (!known || *known == calib::TravelDependence::None)
     in.fault("travel.kind", "must be \"per-table\" or \"forward-backward\"");
 
   StoredTravel out;
-  out.differences.kind = known.value_or(calib::estimation::TravelDependence::Backlash);
+  out.differences.kind = known.value_or(calib::TravelDependence::Backlash);
   if (const ModelJson* list = in.find(travel, path, "differences"))
     out.list = read_differences(in, *list, "travel.differences");
   out.differences.D.resize(std::ssize(out.list));
@@ -97,12 +97,12 @@ std::optional<StoredTravel> read_travel(ModelReader& in, std::size_t parameters)
 }
 
 void check_names(ModelReader& in, const StoredTravel& travel, const calib::VolumetricModel& model) {
-  const auto expected = calib::otf::backlash_of(model);
+  const auto expected = calib::backlash_of(model);
   for (std::size_t i = 0; i < expected.size(); ++i) {
     if (is_same_place(travel.list[i], expected[i])) continue;
-    return in.fault(fmt::format("travel.differences[{}]", i),
-                    fmt::format("is {}, expected {}", calib::otf::label(travel.list[i]),
-                                calib::otf::label(expected[i])));
+    return in.fault(
+        fmt::format("travel.differences[{}]", i),
+        fmt::format("is {}, expected {}", calib::label(travel.list[i]), calib::label(expected[i])));
   }
 }
 

@@ -5,17 +5,17 @@
 #include <optional>
 #include <vector>
 
-#include "abbe/calib/otf/backlash.hpp"
+#include "abbe/calib/model/backlash.hpp"
 #include "model_reader.hpp"
 
 namespace abbe::daemon {
 
 /// Empty in models without backlash.
-[[nodiscard]] std::vector<calib::otf::Backlash> read_backlash(ModelReader& in);
+[[nodiscard]] std::vector<calib::Backlash> read_backlash(ModelReader& in);
 
 struct StoredTravel {
   calib::TravelDifferences differences;
-  std::vector<calib::otf::Backlash> list;  ///< with names and positions
+  std::vector<calib::Backlash> list;  ///< with names and positions
 };
 /// nullopt in models whose V does not depend on the direction of travel, which those of earlier
 /// versions are. `parameters`: number of parameters of the model.

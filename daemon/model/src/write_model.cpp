@@ -3,6 +3,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/calib/model/backlash.hpp"
 #include "abbe/model/model_document.hpp"
 #include "decimal.hpp"
 #include "model_format.hpp"
@@ -48,7 +49,7 @@ std::string numbers(std::span<const double> list, int shift) {
   return text + "]";
 }
 
-void write_polynomials(JsonText& out, const calib::evemu::EvemuModel& model) {
+void write_polynomials(JsonText& out, const calib::PolynomialModel& model) {
   const auto& design = model.design();
   out.key("basis");
   out.raw(
@@ -84,7 +85,7 @@ void write_parameters(JsonText& out, const calib::VolumetricModel& model) {
   out.raw("\n  ]");
 }
 
-std::string differences(std::span<const calib::otf::Backlash> list, std::string_view indent) {
+std::string differences(std::span<const calib::Backlash> list, std::string_view indent) {
   std::string text = "[";
   for (const auto& b : list) {
     text += fmt::format("{}\n{}  {{\"name\": \"{}\", ", text.size() > 1 ? "," : "", indent,
@@ -97,7 +98,7 @@ std::string differences(std::span<const calib::otf::Backlash> list, std::string_
   return fmt::format("{}\n{}]", text, indent);
 }
 
-void write_backlash(JsonText& out, std::span<const calib::otf::Backlash> backlash) {
+void write_backlash(JsonText& out, std::span<const calib::Backlash> backlash) {
   out.key("backlash");
   out.raw(differences(backlash, "  "));
 }
@@ -108,8 +109,8 @@ void write_travel(JsonText& out, const calib::VolumetricModel& model) {
   const calib::TravelDifferences& d = *model.travel();
   out.key("travel");
   out.raw(fmt::format("{{\"kind\": \"{}\",\n    \"differences\": {},\n    \"covariance\": [",
-                      calib::otf::backlash_name(d.kind),
-                      differences(calib::otf::backlash_of(model), "    ")));
+                      calib::backlash_name(d.kind),
+                      differences(calib::backlash_of(model), "    ")));
 
   for (Eigen::Index i = 0; i < d.D.size(); ++i) {
     std::string row;
@@ -412,7 +413,7 @@ std::string to_json(const ModelDocument& document) {
   return out.finish();
 }
 
-std::string to_coefficients_csv(const calib::evemu::EvemuModel& model) {
+std::string to_coefficients_csv(const calib::PolynomialModel& model) {
   std::string text = "name,value,u,unit\n";
   for (const auto& c : model.named_coefficients())
     text += fmt::format("{},{:.17g},{:.17g},{}\n", c.name, c.value, c.u, c.unit);
@@ -420,7 +421,7 @@ std::string to_coefficients_csv(const calib::evemu::EvemuModel& model) {
 }
 
 std::string to_tables_csv(const calib::VolumetricModel& model,
-                          std::span<const calib::otf::Backlash> backlash) {
+                          std::span<const calib::Backlash> backlash) {
   std::string text = "name,position_mm,value,u,unit\n";
   for (const auto& p : model.parameters())
     text +=

@@ -7,7 +7,8 @@
 #include <utility>
 
 #include "abbe/calib/environment/thermal_expansion.hpp"
-#include "abbe/calib/root_sum_of_squares.hpp"
+#include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 
@@ -246,7 +247,7 @@ Result<calib::RefractiveIndex> index_of_air(const EnvironmentSample& environment
                        .u_pressure_Pa = config.u_pressure_Pa,
                        .u_relative_humidity = config.u_relative_humidity,
                        .u_co2_ppm = config.u_co2_ppm};
-  auto index = calib::refractive_index(air, config.wavelength_m, config.equation);
+  auto index = calib::refractive_index(air, config.wavelength_m, calib_of(config.equation));
   if (!index) return fail(ErrorCode::DataInsufficient, index.error().text);
   return *index;
 }

@@ -99,8 +99,8 @@ void set_device(const Config& config, const EnvironmentSource& device, CheckedSe
   sensor.limits.forget_after = std::max(config.sensors.forget, kReadingsRemembered * device.period);
 }
 
-/// Sensor of the tracker's controller. It arrives when it changes, and every ten seconds while points
-/// arrive: no second reading confirms the first soon, and a refused value is not held.
+/// Sensor of the tracker's controller. It arrives when it changes, and every ten seconds while
+/// points arrive: no second reading confirms the first soon, and a refused value is not held.
 void set_weather_station(const Config& config, const TrackerSource& tracker,
                          CheckedSensor& sensor) {
   sensor.device = tracker.device;

@@ -18,7 +18,8 @@ struct DoubtedReading {
   std::string twin = {};  ///< name
 };
 
-/// "scale_x is not available (X is missing): it reads 85.00 C, expected 20.80 to 21.80 C; check ..."
+/// "scale_x is not available (X is missing): it reads 85.00 C, expected 20.80 to 21.80 C; check
+/// ..."
 [[nodiscard]] std::string text_of(const CheckedSensor& sensor, const DoubtedReading& doubted);
 /// "scale_x: a reading dated 12.0 s in the future is not used; ..."
 [[nodiscard]] std::string future_text(const CheckedSensor& sensor, std::chrono::nanoseconds ahead);

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "abbe/calib/interpolation_grid.hpp"
+#include "abbe/calib/model/interpolation_grid.hpp"
 #include "abbe/pipeline/live_view.hpp"
 
 namespace abbe::daemon {
@@ -49,12 +49,12 @@ std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
   return hull;
 }
 
-/// The mean of both directions of travel: the gate and the held-out legs test the mean, and a vector
-/// that steps at a reversal could move the axis back and step again.
+/// The mean of both directions of travel: the gate and the held-out legs test the mean, and a
+/// vector that steps at a reversal could move the axis back and step again.
 calib::VolumetricError error_in_either_direction(const calib::VolumetricModel& model,
                                                  const calib::Vector3& q_m,
                                                  const calib::Vector3& tool_m) {
-  constexpr calib::estimation::AxisTravel kUnknown{};
+  constexpr calib::AxisTravel kUnknown{};
   return model.error_at(q_m, tool_m, kUnknown);
 }
 
@@ -111,7 +111,7 @@ v1::ErrorModel model_message(const PublishedModel& active, const Stamp& stamp) {
   m.gauge(std::string{calib::name(active.model.gauge())});
   m.chain(active.model.chain().text());
   const auto interpolation = active.model.interpolation();
-  m.basis(interpolation ? std::string{calib::estimation::name(*interpolation)} : "legendre");
+  m.basis(interpolation ? std::string{calib::name(*interpolation)} : "legendre");
   m.squareness("travel");
   m.tool_offset_m(array(active.model.tool_offsets_m().front()));
 

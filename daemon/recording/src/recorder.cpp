@@ -57,9 +57,9 @@ void Recorder::State::put(Stream stream, Dates dates, std::span<const std::byte>
                           utc_ns(dates.taken), utc_ns(dates.described), data});
 }
 
-/// Repeats environment samples in a new file: those that its instants need, and because some devices
-/// send only changes. The messages are dated at the beginning of the file; their content keeps the
-/// time of measurement.
+/// Repeats environment samples in a new file: those that its instants need, and because some
+/// devices send only changes. The messages are dated at the beginning of the file; their content
+/// keeps the time of measurement.
 void Recorder::State::add_carried_environment(protocol::HostTime begin) {
   v1::EnvironmentSample message;
   std::vector<std::byte> bytes;

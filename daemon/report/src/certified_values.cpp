@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/backlash.hpp"
+#include "abbe/calib/model/backlash.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -170,7 +170,7 @@ ValueGroup angular_group(const calib::iso::StandardValues& standard) {
 ValueGroup backlash_group(const calib::VolumetricModel& model) {
   ValueGroup group{
       "Backlash of the tables", "Forward minus backward, the largest of each table.", {}};
-  for (const auto& b : calib::otf::largest_of_tables(calib::otf::backlash_of(model)))
+  for (const auto& b : calib::largest_of_tables(calib::backlash_of(model)))
     group.values.push_back(certified(calib::name(b.motion) + ".backlash",
                                      calib::name(b.motion) + ": backlash", {b.value, b.u},
                                      is_rotation(b.motion.motion)));

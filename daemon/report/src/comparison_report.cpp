@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"
 #include "report_sections.hpp"

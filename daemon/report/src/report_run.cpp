@@ -192,7 +192,7 @@ void add_tracker_drift(HtmlReport& page, const TrackerDriftFigures& drift) {
 }
 
 /// One curve per table over the nodes of its axis, for backlash that depends on the position.
-LineChart backlash_chart(const std::vector<calib::otf::Backlash>& backlash, calib::Axis axis,
+LineChart backlash_chart(const std::vector<calib::Backlash>& backlash, calib::Axis axis,
                          bool angles) {
   LineChart chart{.title = fmt::format("Backlash of {}, {}", letter(axis),
                                        angles ? "rotations" : "translations"),

@@ -33,8 +33,8 @@ inline constexpr std::string_view kNotRecorded = "Not recorded.";
 inline constexpr std::string_view kResidualsOfParts =
     "A joint model has no residuals of its own; the models of its parts have them.";
 
-/// Of an update (`[drift] continuous`): whose residuals and statistics are reported. Empty: those of
-/// the model itself.
+/// Of an update (`[drift] continuous`): whose residuals and statistics are reported. Empty: those
+/// of the model itself.
 [[nodiscard]] std::string whose_residuals(const ModelDocument& document);
 
 /// "1.23 +- 0.45 um", "1.2 um", "not estimable".

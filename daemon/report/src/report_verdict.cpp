@@ -12,8 +12,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// Equipment whose calibration was not valid any more on the last day of the measurement; of a model
-/// that does not have this day, on the day of its identification.
+/// Equipment whose calibration was not valid any more on the last day of the measurement; of a
+/// model that does not have this day, on the day of its identification.
 void add_expired_equipment(const ReportSubject& subject, std::vector<std::string>& notes) {
   const std::string end = measurement_days(subject, nullptr).end;
   const std::string day = end.empty() ? day_of(subject.document.created) : end;
@@ -25,8 +25,8 @@ void add_expired_equipment(const ReportSubject& subject, std::vector<std::string
                       e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
 }
 
-/// What its user must know apart from the verdict, which is the first statement. Some of it is among
-/// the notes already.
+/// What its user must know apart from the verdict, which is the first statement. Some of it is
+/// among the notes already.
 void add_obstacles(const ReportSubject& subject, std::vector<std::string>& notes) {
   const auto found = obstacles_to_use(in_use(subject, ModelPurpose::Look)).statements;
   for (std::size_t i = 1; i < found.size(); ++i)

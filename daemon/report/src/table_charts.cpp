@@ -23,7 +23,7 @@ struct TableValue {
 
 TableValue value_at(const VolumetricModel& model, const calib::Table& table, double position_m) {
   const auto& interpolation = model.tables()->interpolation(table.motion.axis);
-  const calib::estimation::NodeWeights weights = interpolation.at(position_m);
+  const calib::NodeWeights weights = interpolation.at(position_m);
   const auto offset = static_cast<Eigen::Index>(table.offset + weights.first());
   const auto count = static_cast<Eigen::Index>(weights.count());
   Eigen::VectorXd w(count);
@@ -59,8 +59,8 @@ Curve curve_of(const VolumetricModel& model, const calib::Table& table) {
   }
 
   curve.key = calib::name(table.motion);
-  curve.name = fmt::format("{}, U \u2264 {:.2g}", curve.key,
-                           2.0 * *std::ranges::max_element(curve.u));
+  curve.name =
+      fmt::format("{}, U \u2264 {:.2g}", curve.key, 2.0 * *std::ranges::max_element(curve.u));
   return curve;
 }
 

@@ -81,8 +81,8 @@ std::string text_of_key(const CertifiedValues& values, std::string_view key) {
   return value != nullptr ? with_U(*value) : std::string();
 }
 
-/// To minutes: "2024-05-17T08:30", the end of the measurement; "identified 2024-05-17T08:30" if that
-/// is not recorded.
+/// To minutes: "2024-05-17T08:30", the end of the measurement; "identified 2024-05-17T08:30" if
+/// that is not recorded.
 std::string date_in_table(const ModelDocument& document) {
   constexpr std::size_t kMinutes = 16;
   const std::string text = to_text(time_of(document)).substr(0, kMinutes);
@@ -94,9 +94,8 @@ void add_trend_table(HtmlReport& page, const std::vector<TrendPoint>& points) {
   for (const TrendPoint& point : points) {
     const VerdictInWords verdict = verdict_in_words(*point.subject);
     rows.push_back({model_id(point.subject->document), date_in_table(point.subject->document),
-                    std::string{lamp_name(verdict.signal)},
-                    text_of_key(point.values, "V.max"), text_of_key(point.values, "M_d"),
-                    text_of_key(point.values, "EC0Y")});
+                    std::string{lamp_name(verdict.signal)}, text_of_key(point.values, "V.max"),
+                    text_of_key(point.values, "M_d"), text_of_key(point.values, "EC0Y")});
   }
   page.table(
       {"model", "measured (UTC)", "verdict", "largest |V|", "largest M of a diagonal", "EC0Y"},

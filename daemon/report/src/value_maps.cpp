@@ -77,8 +77,8 @@ std::string rectangle(double left, double top, double width, double height,
                      left, top, width, height, attributes);
 }
 
-/// The cells with a value, on hatching. One area is hatched for all others: Chromium needs minutes to
-/// print hundreds.
+/// The cells with a value, on hatching. One area is hatched for all others: Chromium needs minutes
+/// to print hundreds.
 std::string cells(const Frame& frame, double largest) {
   const ValueMap& map = frame.map;
   const std::size_t columns = map.x_edges.size() - 1;

@@ -98,8 +98,7 @@ ModelMaps maps_of(const calib::VolumetricModel& model) {
           0.5 * (cuts.x_edges_m[c] + cuts.x_edges_m[c + 1]);
       q(static_cast<Eigen::Index>(index(cuts.y))) =
           0.5 * (cuts.y_edges_m[r] + cuts.y_edges_m[r + 1]);
-      const auto e =
-          model.error_at(q, model.tool_offsets_m().front(), calib::estimation::AxisTravel{});
+      const auto e = model.error_at(q, model.tool_offsets_m().front(), calib::AxisTravel{});
       if (!e.inside) continue;
       maps.V.maps[slab].values[i] = e.V_m.norm() * kUmPerM;
       maps.U.maps[slab].values[i] = 2.0 * std::sqrt(e.cov_V_m2.trace()) * kUmPerM;

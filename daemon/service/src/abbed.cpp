@@ -490,8 +490,8 @@ struct Abbed::State {
     return now;
   }
 
-  /// Reports and records each change of the wall clock once: the dates of the recording are those of
-  /// the start.
+  /// Reports and records each change of the wall clock once: the dates of the recording are those
+  /// of the start.
   void follow_clock() {
     const ClockChange change = clock.since_start();
     const auto further = [](auto a, auto b) {

@@ -287,9 +287,9 @@ Reply look_at_verification(VerificationService& service, std::uint64_t number, s
                             .stopped = service.stopped()}] { return verification_json(seen); };
 }
 
-/// {"step": "begin"} returns the number of the verification and the name of the machine. {"step": "look" | "end", "number": ..,
-/// "from": k} returns the points from index k on; with "end", the present standstill becomes the
-/// last point first.
+/// {"step": "begin"} returns the number of the verification and the name of the machine. {"step":
+/// "look" | "end", "number": .., "from": k} returns the points from index k on; with "end", the
+/// present standstill becomes the last point first.
 Result<OnHub> verification(const HubParts& parts, const json& request) {
   if (parts.verification == nullptr) return fail(ErrorCode::Refused, "verify: not in this daemon");
   const auto step = request.at("step").get<std::string>();

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "abbe/calib/otf/backlash.hpp"
+#include "abbe/calib/otf/solve/backlash.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/drift.hpp"
@@ -47,9 +47,9 @@ void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});
 }
 
-std::vector<calib::otf::Backlash> determined_backlash(const calib::VolumetricModel& model) {
-  std::vector<calib::otf::Backlash> all;
-  for (const auto& backlash : calib::otf::backlash_of(model))
+std::vector<calib::Backlash> determined_backlash(const calib::VolumetricModel& model) {
+  std::vector<calib::Backlash> all;
+  for (const auto& backlash : calib::backlash_of(model))
     if (backlash.determined) all.push_back(backlash);
   return all;
 }

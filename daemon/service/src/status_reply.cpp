@@ -25,8 +25,8 @@ namespace {
 
 using nlohmann::json;
 
-/// The buckets that are not empty: [exclusive upper bound in s, count]. A client that asks twice has
-/// the histogram of the time in between.
+/// The buckets that are not empty: [exclusive upper bound in s, count]. A client that asks twice
+/// has the histogram of the time in between.
 json latency_json(const drivers::LatencyHistogram::Counts& counts) {
   json buckets = json::array();
   for (std::size_t i = 0; i < counts.of_bucket.size(); ++i) {

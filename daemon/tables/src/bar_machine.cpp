@@ -8,7 +8,7 @@ namespace abbe::daemon {
 
 Result<void> check_bar_machine(const std::filesystem::path& file, const MachineConfig& machine) {
   constexpr std::size_t kFewestCubicNodes = 4;
-  if (machine.interpolation == calib::estimation::Interpolation::Linear) return {};
+  if (machine.interpolation == TableInterpolation::Linear) return {};
   const auto parsed = parse_toml_file(file);
   if (!parsed) return tl::make_unexpected(parsed.error());
 

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/mfb/points_of_interest.hpp"
+#include "abbe/calib/mfb/run/points_of_interest.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -2,7 +2,7 @@
 /// [pattern] of bar.toml.
 
 #include "abbe/base/faults.hpp"
-#include "abbe/calib/mfb/bar.hpp"
+#include "abbe/calib/mfb/run/bar.hpp"
 #include "abbe/config/section.hpp"
 
 namespace abbe::daemon {

@@ -9,7 +9,7 @@
 
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/axis_mistakes.hpp"
+#include "abbe/calib/geometry/axis_mistakes.hpp"
 #include "abbe/tables/mfb_files.hpp"
 
 namespace abbe::daemon {
@@ -167,8 +167,8 @@ void check_readings(const NumberTable& table, const calib::MachineNodes& nodes, 
   }
 }
 
-/// Correlation of the number of a row with the number of its feature: 1 for a pass from hole 1 to the
-/// last hole.
+/// Correlation of the number of a row with the number of its feature: 1 for a pass from hole 1 to
+/// the last hole.
 double correlation_with_index(const PassTouches& touches) {
   const auto count = static_cast<double>(touches.size());
   double mean_row = 0.0, mean_index = 0.0;

@@ -12,7 +12,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/config/bounded_toml.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/section.hpp"
 #include "expansivity.hpp"
 #include "whole_number.hpp"

@@ -10,7 +10,7 @@
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 
 namespace abbe::daemon {
 
@@ -24,12 +24,10 @@ AxisPosition position_m(const NumberTable& table, std::size_t row, std::size_t f
 }
 
 /// Directions in three columns with the words "-", "0", "+".
-calib::estimation::AxisTravel travel_in_row(const NumberTable& table, std::size_t row,
-                                            std::size_t first) {
-  calib::estimation::AxisTravel all{};
+calib::AxisTravel travel_in_row(const NumberTable& table, std::size_t row, std::size_t first) {
+  calib::AxisTravel all{};
   for (std::size_t axis = 0; axis < all.size(); ++axis)
-    all[axis] =
-        static_cast<calib::estimation::Travel>(std::lround(table.at(row, first + axis)) - 1);
+    all[axis] = static_cast<calib::Travel>(std::lround(table.at(row, first + axis)) - 1);
   return all;
 }
 

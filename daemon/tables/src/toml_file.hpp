@@ -11,7 +11,7 @@
 #include "abbe/base/input_file.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 #include "abbe/config/bounded_toml.hpp"
 #include "abbe/config/section.hpp"
 

@@ -6,8 +6,8 @@
 
 #include "abbe/base/faults.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/axis_mistakes.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/config/calibration_input.hpp"
 
 namespace abbe::daemon {
 

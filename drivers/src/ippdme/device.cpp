@@ -177,9 +177,9 @@ DeviceStatus IppDevice::status() const {
   return board_.read(options_.name, touches_.dropped() + positions_.dropped(), raw_.dropped());
 }
 
-/// First without the session, whose state is unknown after an exception: it may count AbortE as sent
-/// although it is not. A second AbortE changes nothing. A message of the server that caused the
-/// exception is not handled again.
+/// First without the session, whose state is unknown after an exception: it may count AbortE as
+/// sent although it is not. A second AbortE changes nothing. A message of the server that caused
+/// the exception is not handled again.
 bool IppDevice::stop_after_failure() {
   if (!session().may_move()) return false;
   emergency_stop_.set_moving(true);

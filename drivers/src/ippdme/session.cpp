@@ -267,8 +267,8 @@ IppAction IppSession::send(const Step& step) {
   return IppSend{fmt::format("{} {}\r\n", ippdme::to_string(tag), step.method)};
 }
 
-/// Sends a motion once it is stored that the machine moves: see IppMotionStored. A stop, an error or
-/// a lost connection in between discards the motion.
+/// Sends a motion once it is stored that the machine moves: see IppMotionStored. A stop, an error
+/// or a lost connection in between discards the motion.
 IppAction IppSession::begin_motion(Step step) {
   step.moves = true;
   state_ = IppState::Storing;

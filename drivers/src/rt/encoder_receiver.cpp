@@ -328,8 +328,8 @@ void EncoderReceiver::end_bus_off() ABBE_RT {
   restarted_pending_ = true;
 }
 
-/// The first count is used as sent (an absolute scale may be negative); that of a rotary axis may be
-/// whole ranges of the encoder away from the travel of the axis, whose middle is then nearest.
+/// The first count is used as sent (an absolute scale may be negative); that of a rotary axis may
+/// be whole ranges of the encoder away from the travel of the axis, whose middle is then nearest.
 std::int64_t EncoderReceiver::first_count(const Axis& axis, std::int64_t count) ABBE_RT {
   if (!axis.middle || axis.modulus == 0 || axis.scale == 0.0) return count;
   constexpr double kMostCounts = 0x1p62;

@@ -21,8 +21,8 @@ constexpr double kPerPercent = 0.01;
 /// Points measured before a beam break may arrive after its report. The beam has returned at the
 /// first point after a gap of at least this duration, and of at least three point separations.
 constexpr std::chrono::milliseconds kShortestBreak{20};
-/// Period in which weather that does not change is passed on again: a check that refused it can judge
-/// it again.
+/// Period in which weather that does not change is passed on again: a check that refused it can
+/// judge it again.
 constexpr std::chrono::seconds kWeatherRepeated{10};
 
 SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
@@ -40,7 +40,8 @@ SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
   return SampleFlag::PointInvalid;  // also for unknown values
 }
 
-/// A point that arrives later than this was stored by a stalled network; the controller stores less.
+/// A point that arrives later than this was stored by a stalled network; the controller stores
+/// less.
 constexpr std::chrono::minutes kLongestDelay{1};
 
 bool finite(const std::array<double, 3>& v) ABBE_RT {

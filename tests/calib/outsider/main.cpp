@@ -1,4 +1,4 @@
-#include <abbe/calib/otf/identify.hpp>
+#include <abbe/calib/otf/identify/identify.hpp>
 #include <iostream>
 
 int main() {

@@ -3,9 +3,11 @@
 //   dds_hostile_peer DOMAIN SEED            everything
 //   dds_hostile_peer DOMAIN SEED dispose    only samples that dispose or unregister an instance,
 //                                           with and without key
-//   dds_hostile_peer DOMAIN SEED numbers    only gaps of numbers far apart, and heartbeats that skip
+//   dds_hostile_peer DOMAIN SEED numbers    only gaps of numbers far apart, and heartbeats that
+//   skip
 //                                           a million million numbers
-//   dds_hostile_peer DOMAIN SEED tokens     only messages of authentication, whole and in fragments,
+//   dds_hostile_peer DOMAIN SEED tokens     only messages of authentication, whole and in
+//   fragments,
 //                                           that state four thousand million tokens
 //   dds_hostile_peer DOMAIN SEED forged     only vectors of 999 um, unsigned, with the GUIDs of the
 //                                           writers that the other participants may have
@@ -119,8 +121,8 @@ class HostilePeer {
     for (auto& b : bytes) b = any8();
     return bytes;
   }
-  /// Of a machine of its own, while the participant is discovered: a reader that is matched delivers
-  /// them. Later a number near the largest keeps it from the smaller ones.
+  /// Of a machine of its own, while the participant is discovered: a reader that is matched
+  /// delivers them. Later a number near the largest keeps it from the smaller ones.
   void send_valid_samples() {
     constexpr auto kIdentity = static_cast<std::size_t>(daemon::Topic::Identity),
                    kSnapshot = static_cast<std::size_t>(daemon::Topic::Snapshot);

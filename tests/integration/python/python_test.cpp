@@ -1,5 +1,5 @@
-/// The Python package, run by the interpreter as a user runs it: its numbers against those of C++, its
-/// errors, and its examples with a recording, a model and a running abbed.
+/// The Python package, run by the interpreter as a user runs it: its numbers against those of C++,
+/// its errors, and its examples with a recording, a model and a running abbed.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -51,7 +51,8 @@ struct Python : Spine {
   }
 };
 
-/// Prints V, its covariance, c and inside at the points of a file, one line of numbers for each, exact.
+/// Prints V, its covariance, c and inside at the points of a file, one line of numbers for each,
+/// exact.
 constexpr const char* kEvaluate = R"(
 import abbe, numpy, sys
 model = abbe.Model.load(sys.argv[1])
@@ -131,7 +132,7 @@ except abbe.Error as error:
   const auto seen = python({"-c", kDirections, file("travel.json"), file("plain.json")});
   ASSERT_EQ(seen.code, 0) << seen.err;
 
-  using calib::estimation::Travel;
+  using calib::Travel;
   const calib::Vector3 p(0.01, 0.02, -0.2), tool = document.model.tool_offsets_m().front();
   std::istringstream lines{seen.out};
   const auto next_vector = [&lines] {
@@ -144,10 +145,10 @@ except abbe.Error as error:
     return v;
   };
   std::vector<calib::Vector3> different;
-  for (const calib::estimation::AxisTravel& travel :
-       {calib::estimation::AxisTravel{Travel::Forward, Travel::Backward, Travel::Forward},
-        calib::estimation::AxisTravel{Travel::Backward, Travel::Unknown, Travel::Forward},
-        calib::estimation::AxisTravel{}}) {
+  for (const calib::AxisTravel& travel :
+       {calib::AxisTravel{Travel::Forward, Travel::Backward, Travel::Forward},
+        calib::AxisTravel{Travel::Backward, Travel::Unknown, Travel::Forward},
+        calib::AxisTravel{}}) {
     different.push_back(next_vector());
     EXPECT_EQ(different.back(), document.model.error_at(p, tool, travel).V_m);
     EXPECT_EQ(next_vector(), document.model.command_correction(p, tool, travel).value().c_m);

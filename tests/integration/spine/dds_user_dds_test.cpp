@@ -1,5 +1,5 @@
-/// abbe-dds as a user of its own, as abbe-dds.service runs it: it has its link and nothing else. The
-/// user is "nobody". Only root may start programs as another user.
+/// abbe-dds as a user of its own, as abbe-dds.service runs it: it has its link and nothing else.
+/// The user is "nobody". Only root may start programs as another user.
 
 #include <gmock/gmock.h>
 #include <signal.h>

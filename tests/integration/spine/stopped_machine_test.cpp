@@ -1,4 +1,5 @@
-/// A stop of the measuring machine is answered with what is known: stopped, not confirmed, not sent.
+/// A stop of the measuring machine is answered with what is known: stopped, not confirmed, not
+/// sent.
 
 #include <gmock/gmock.h>
 #include <signal.h>

@@ -32,8 +32,12 @@ struct Systemd : Spine {
 };
 
 TEST_F(Systemd, FindsNothingWrongWithTheUnits) {
-  std::vector<std::string> command{kAnalyze, "verify", "--man=no", file("abbed.service"),
-                                   file("abbe-web.service"), file("abbe-mtconnect.service")};
+  std::vector<std::string> command{kAnalyze,
+                                   "verify",
+                                   "--man=no",
+                                   file("abbed.service"),
+                                   file("abbe-web.service"),
+                                   file("abbe-mtconnect.service")};
 #ifdef ABBE_WITH_DDS
   command.push_back(file("abbe-dds.service"));
 #endif

@@ -215,7 +215,8 @@ TEST_F(WaysToEnd, AHubThatHangsStopsTheMachineWithoutAWatchdog) {
   report("the hub hangs", true, code, line_with("the hub hangs"));
 }
 
-/// systemd's watchdog sends SIGABRT when it is not fed: here the main thread, which feeds it, hangs.
+/// systemd's watchdog sends SIGABRT when it is not fed: here the main thread, which feeds it,
+/// hangs.
 TEST_F(WaysToEnd, TheWatchdogStopsTheMachineWhenTheMainThreadHangs) {
   ASSERT_NO_FATAL_FAILURE(begin());
   if (!stop_thread(abbed_->pid())) GTEST_SKIP() << "ptrace is not allowed here";

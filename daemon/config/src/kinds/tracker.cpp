@@ -4,7 +4,8 @@
 
 #include <cmath>
 
-#include "abbe/calib/otf/nest_visits.hpp"
+#include "abbe/calib/otf/samples/nest_visits.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/drivers/tracker/order.hpp"
 #include "classified_section.hpp"
@@ -53,9 +54,9 @@ void read_placement(ClassifiedSection& tracker, MachineConfig& machine) {
     tracker.fault("position_mm", "must be three numbers, x, y, z in machine coordinates");
 }
 
-calib::otf::Nest read_nest(ClassifiedSection& section) {
+NestConfig read_nest(ClassifiedSection& section) {
   constexpr Bounds kRadius_mm{0.5, 200.0};
-  calib::otf::Nest nest;
+  NestConfig nest;
   std::vector<double> position_m;
   section.get(operation("name"), nest.name, Need::Required);
   if (section.get(operation("position_mm"), position_m, kMilli, Need::Required)) {
@@ -69,13 +70,14 @@ calib::otf::Nest read_nest(ClassifiedSection& section) {
   return nest;
 }
 
-void read_nests(ClassifiedSection& tracker, calib::otf::NestOptions& out) {
+void read_nests(ClassifiedSection& tracker, OtfConfig& out) {
   constexpr Bounds kRepeatability_um{0.1, 100.0};
-  tracker.get(operation("nest_repeatability_um"), out.u_repeatability_m, kMicro, kRepeatability_um);
+  tracker.get(operation("nest_repeatability_um"), out.u_nest_repeatability_m, kMicro,
+              kRepeatability_um);
   for (auto& section : tracker.children("nest", "name")) {
     out.nests.push_back(read_nest(section));
     if (out.nests.back().name.empty()) continue;
-    if (const auto valid = calib::otf::find_nest_visits({}, out, {}); !valid)
+    if (const auto valid = calib::otf::find_nest_visits({}, nest_options(out), {}); !valid)
       section.fault("", valid.error().text);
   }
 }
@@ -168,8 +170,8 @@ void read_tracker(ClassifiedSection& root, Config& out, StreamNames& names) {
   read_noise(tracker, out.machine);
   read_place(tracker, out.machine);
   read_placement(tracker, out.machine);
-  read_nests(tracker, out.otf.nests);
-  if (!out.machine.tracker_place.empty() && !out.otf.nests.nests.empty())
+  read_nests(tracker, out.otf);
+  if (!out.machine.tracker_place.empty() && !out.otf.nests.empty())
     tracker.fault("place",
                   "needs no [[tracker.nest]]: with nests the offset of the ranges is "
                   "estimated beside the drift, and is not kept");

@@ -6,9 +6,9 @@
 
 namespace abbe::daemon {
 
-/// Verdict, residuals at the balls by position, the places of the balls, and as tables: the rotation
-/// that touches do not determine, the array, the rotations of the positions, the choice of lambda
-/// and gamma.
+/// Verdict, residuals at the balls by position, the places of the balls, and as tables: the
+/// rotation that touches do not determine, the array, the rotations of the positions, the choice of
+/// lambda and gamma.
 [[nodiscard]] RunFigures evemu_figures(const EvemuCandidate& candidate);
 
 }  // namespace abbe::daemon

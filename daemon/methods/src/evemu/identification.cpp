@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/tables/evemu_files.hpp"

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <utility>
 
-#include "abbe/calib/mfb/reading_mistakes.hpp"
+#include "abbe/calib/mfb/observe/reading_mistakes.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
 #include "abbe/methods/otf/inputs.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 
 namespace abbe::daemon {
 
@@ -55,10 +55,10 @@ void add_notes_on_bar(const mfb::Bar& bar, std::span<const mfb::Measurement> mea
 }  // namespace
 
 Result<calib::mfb::MfbMachine> mfb_machine(const MachineConfig& machine) {
-  using calib::estimation::Interpolation;
+  using calib::Interpolation;
   auto described = otf_machine(machine);
   if (!described) return tl::unexpected(described.error());
-  const bool linear = machine.interpolation == Interpolation::Linear;
+  const bool linear = machine.interpolation == TableInterpolation::Linear;
   return calib::mfb::MfbMachine{described->chain, std::move(described->nodes),
                                 linear ? Interpolation::Linear : Interpolation::NotAKnotCubic};
 }
@@ -66,7 +66,7 @@ Result<calib::mfb::MfbMachine> mfb_machine(const MachineConfig& machine) {
 std::vector<std::string> notes_on_inputs(const mfb::Bar& bar, const mfb::Plan& plan,
                                          const MachineConfig& machine) {
   std::vector<std::string> notes;
-  if (machine.interpolation == calib::estimation::Interpolation::Linear)
+  if (machine.interpolation == TableInterpolation::Linear)
     notes.emplace_back(
         "the tables are linear between their nodes: for smooth errors set [model] basis = "
         "\"cubic\"");

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "abbe/base/sha256.hpp"
-#include "abbe/calib/mfb/plan_prediction.hpp"
+#include "abbe/calib/mfb/plan/plan_prediction.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/json_vector.hpp"

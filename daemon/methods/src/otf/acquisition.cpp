@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/config/linear_axes.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 
@@ -310,8 +310,8 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
     here = on_leg(leg_);
   }
 
-  // Short legs that were driven between two tracker points, too: the direction of travel behind them
-  // depends on them.
+  // Short legs that were driven between two tracker points, too: the direction of travel behind
+  // them depends on them.
   while (begun_leg_ < leg_) begin_leg(begun_leg_ + 1, point, q);
   on_leg_at_ = point.time;
   driven_m_ = driven_at_m_[leg_] + here.along_m;

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "abbe/base/sha256.hpp"
-#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 
 namespace abbe::daemon {

@@ -7,12 +7,12 @@
 #include <cmath>
 #include <string>
 
-#include "abbe/calib/otf/backlash.hpp"
-#include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/orientation.hpp"
-#include "abbe/calib/otf/plan_observable.hpp"
-#include "abbe/calib/otf/polyline.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/orientation.hpp"
+#include "abbe/calib/otf/plan/plan_observable.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
+#include "abbe/calib/otf/solve/backlash.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/stretched.hpp"
 #include "abbe/pipeline/environment_use.hpp"
@@ -58,10 +58,10 @@ namespace {
 /// Whether a run along the path determines the tables.
 calib::Result<void> determines_tables(const calib::otf::Path& path,
                                       const calib::otf::Machine& machine, calib::otf::Mode mode,
-                                      calib::estimation::TravelDependence backlash) {
+                                      calib::TravelDependence backlash) {
   if (mode == calib::otf::Mode::OnTheFly)
     return calib::otf::check_observable(path, machine, backlash);
-  if (backlash == calib::estimation::TravelDependence::None) return {};
+  if (backlash == calib::TravelDependence::None) return {};
   const auto first =
       calib::otf::first_with_known_travel(calib::otf::travel_along(path.vertices_m, mode));
   if (!first) return tl::unexpected(first.error());
@@ -71,7 +71,7 @@ calib::Result<void> determines_tables(const calib::otf::Path& path,
 }  // namespace
 
 Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine,
-                            calib::otf::Mode mode, calib::estimation::TravelDependence backlash) {
+                            calib::otf::Mode mode, calib::TravelDependence backlash) {
   if (auto given = require_target(machine); !given) return given;
   const auto known = otf_machine(machine);
   if (!known) return tl::unexpected(known.error());
@@ -98,12 +98,12 @@ std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const Run
 calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> points,
                                 const Config& config) {
   calib::otf::Options options;
-  options.mode = config.otf.mode;
+  options.mode = calib_of(config.otf.mode);
   options.standstill.u_repeatability_m = config.otf.u_repeatability_m;
-  options.estimator = config.otf.estimator;
-  options.backlash = config.otf.backlash;
-  options.nests = config.otf.nests;
-  options.smoothness = config.otf.smoothness;
+  options.estimator = calib_of(config.otf.estimator);
+  options.backlash = calib_of(config.otf.backlash);
+  options.nests = nest_options(config.otf);
+  options.smoothness = smoothness_options(config.otf);
   options.block_samples = calib::otf::suitable_block_samples(points);
   options.held_out_folds =
       static_cast<std::size_t>(std::lround(1.0 / config.gate.holdout_fraction));

@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
-#include "abbe/calib/error_parameters.hpp"
-#include "abbe/calib/otf/nest_visits.hpp"
+#include "abbe/calib/geometry/error_parameters.hpp"
+#include "abbe/calib/otf/samples/nest_visits.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/environment_use.hpp"
 #include "otf/vector_of.hpp"
@@ -49,8 +49,9 @@ LiveTables live_tables(const calib::otf::TablesSoFar& found, const calib::Machin
 Result<OtfLiveTables> OtfLiveTables::of(const Config& config) {
   auto machine = otf_machine(config.machine);
   if (!machine) return tl::unexpected(machine.error());
-  auto estimate = calib::otf::RunningEstimate::of(
-      {.machine = *machine, .noise = otf_noise(config.machine), .backlash = config.otf.backlash});
+  auto estimate = calib::otf::RunningEstimate::of({.machine = *machine,
+                                                   .noise = otf_noise(config.machine),
+                                                   .backlash = calib_of(config.otf.backlash)});
   if (!estimate) return tl::unexpected(error_of(estimate.error()));
   return OtfLiveTables(config, std::move(*machine), std::move(*estimate));
 }
@@ -59,7 +60,7 @@ OtfLiveTables::OtfLiveTables(const Config& config, calib::otf::Machine machine,
                              calib::otf::RunningEstimate estimate)
     : environment_use_(environment_use(config)),
       nodes_(std::move(machine.nodes)),
-      nests_(config.otf.nests.nests),
+      nests_(nest_options(config.otf).nests),
       estimate_(std::move(estimate)) {}
 
 void OtfLiveTables::take(RunNews&& news) {

@@ -29,7 +29,7 @@ namespace {
 /// Throws like json::get() for a text that is no mode.
 std::optional<calib::otf::Mode> mode_of(const nlohmann::json& object, const Config* config) {
   if (!object.contains("mode"))
-    return config != nullptr ? std::optional{config->otf.mode} : std::nullopt;
+    return config != nullptr ? std::optional{calib_of(config->otf.mode)} : std::nullopt;
   const auto text = object.at("mode").get<std::string>();
   const auto mode = calib::otf::mode_named(text);
   if (!mode)
@@ -50,8 +50,9 @@ Result<void> OtfMethod::check(const Request& request, const Config& config) {
         ErrorCode::Refused,
         fmt::format("calibrate otf: [{}] mode = \"stationary\" gives no points during motion",
                     tracker->key));
-  return check_otf_path(request.path_m, config.machine, request.mode.value_or(config.otf.mode),
-                        config.otf.backlash);
+  return check_otf_path(request.path_m, config.machine,
+                        request.mode.value_or(calib_of(config.otf.mode)),
+                        calib_of(config.otf.backlash));
 }
 
 Result<OtfMethod::Acquisition> OtfMethod::acquire(Request&& request, const Options& options) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/calib/otf/run/polyline.hpp"
 
 namespace abbe::daemon {
 namespace {

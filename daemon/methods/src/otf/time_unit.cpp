@@ -25,8 +25,8 @@ struct TimedPlace {
   Vector3 p_m = Vector3::Zero();
 };
 
-/// Places at equal distances in the sequence. Parts are short compared with the time from one vertex
-/// to the next, so that a dwell is not in the parts in which the machine moves.
+/// Places at equal distances in the sequence. Parts are short compared with the time from one
+/// vertex to the next, so that a dwell is not in the parts in which the machine moves.
 template <class Rows, class Place>
 std::vector<TimedPlace> thinned(const Rows& rows, const PathFile& path, const Place& place_of) {
   constexpr std::size_t kLeastParts = 500, kPartsOfLeg = 20;

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "abbe/base/axis_position.hpp"
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 
 namespace abbe::daemon {
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Checks the values of command line options and escapes messages about them, the same in every program. CLI11 reads whole numbers
-/// as C does (010 is 8, 0x10 is 16), accepts inf and nan, takes an empty value for an absent
-/// option, and prints the bytes of a wrong argument as they are.
+/// Checks the values of command line options and escapes messages about them, the same in every
+/// program. CLI11 reads whole numbers as C does (010 is 8, 0x10 is 16), accepts inf and nan, takes
+/// an empty value for an absent option, and prints the bytes of a wrong argument as they are.
 
 #include <string>
 
@@ -11,9 +11,9 @@
 namespace abbe::protocol {
 
 /// Adds the checks to all options of `app` and of its subcommands: a value must not be empty, and a
-/// number must be decimal. The type of an option says whether it is a number. A message about a wrong
-/// command line escapes what is not printable. Call it after the last option was added, before
-/// parse(). `App`: CLI::App; a template, so that this module does not
+/// number must be decimal. The type of an option says whether it is a number. A message about a
+/// wrong command line escapes what is not printable. Call it after the last option was added,
+/// before parse(). `App`: CLI::App; a template, so that this module does not
 /// depend on CLI11.
 template <class App>
 void check_option_values(App& app) {

@@ -8,9 +8,9 @@
 namespace abbe::protocol {
 
 /// `text` with every character that is not visible as an escape: a control character or an
-/// invisible one (no-break space, zero width space, byte order mark, direction marks) as "\u{200B}",
-/// a byte that is not UTF-8 as "\xFC". A newline remains. Applying the function twice changes
-/// nothing more.
+/// invisible one (no-break space, zero width space, byte order mark, direction marks) as
+/// "\u{200B}", a byte that is not UTF-8 as "\xFC". A newline remains. Applying the function twice
+/// changes nothing more.
 [[nodiscard]] std::string printable(std::string_view text);
 
 /// As printable(), but a newline is written as "\u{A}": for one line of a log.

@@ -2,11 +2,11 @@
 /// The motion of a machine that follows a control: axis positions that arrive as position records
 /// (abbe/protocol/position_record.hpp), one for each servo cycle.
 ///
-/// The time of a record follows from the number of its cycle: cycle x period + offset. The offset is
-/// the smallest difference between arrival and cycle x period, so that a record that arrives late
-/// does not delay the machine. It grows by 100 ppm, so that it follows a control whose period is
-/// longer than it says. Between two records the position is linear; after the newest one it goes on
-/// for 20 ms, then the machine stands there. Records are kept for 2 s. Thread-safe.
+/// The time of a record follows from the number of its cycle: cycle x period + offset. The offset
+/// is the smallest difference between arrival and cycle x period, so that a record that arrives
+/// late does not delay the machine. It grows by 100 ppm, so that it follows a control whose period
+/// is longer than it says. Between two records the position is linear; after the newest one it goes
+/// on for 20 ms, then the machine stands there. Records are kept for 2 s. Thread-safe.
 
 #include <array>
 #include <chrono>

@@ -1,5 +1,6 @@
 #pragma once
-/// A measuring machine with known geometric errors, and the spheres, block faces and the bar on its table:
+/// A measuring machine with known geometric errors, and the spheres, block faces and the bar on its
+/// table:
 /// computes the scale reading of a touch. The tip contacts the true surface; the machine reports
 /// its scale readings at contact. SI, machine coordinates. Pure functions over plain options; safe
 /// to call from any thread.

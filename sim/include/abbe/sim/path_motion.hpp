@@ -25,8 +25,8 @@ struct PathPlan {
   double acceleration_m_per_s2 = 1.0;
   double dwell_s = 0.05;
   double wait_s = 0.0;  ///< duration of a wait at a vertex, after the dwell; 0: no wait
-  /// The first wait is at the first inner vertex, the last at the last one; between them the machine
-  /// waits at the first vertex that it reaches this long after the end of a wait.
+  /// The first wait is at the first inner vertex, the last at the last one; between them the
+  /// machine waits at the first vertex that it reaches this long after the end of a wait.
   double wait_every_s = 180.0;
 };
 

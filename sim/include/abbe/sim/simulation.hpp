@@ -1,8 +1,8 @@
 #pragma once
-/// The complete simulation: machine, the control that it follows, tracker, encoder bus, counter cards, measuring machine and
-/// scheduled faults, stepped together. poll(now) does what is due, never blocks and reads no clock;
-/// a program passes real time, a test any time. Not thread-safe. Exception: with `bus_apart`
-/// another thread may poll the encoder bus.
+/// The complete simulation: machine, the control that it follows, tracker, encoder bus, counter
+/// cards, measuring machine and scheduled faults, stepped together. poll(now) does what is due,
+/// never blocks and reads no clock; a program passes real time, a test any time. Not thread-safe.
+/// Exception: with `bus_apart` another thread may poll the encoder bus.
 
 #include <poll.h>
 

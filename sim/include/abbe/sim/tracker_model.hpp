@@ -48,8 +48,8 @@ struct TrackerView {
 
 [[nodiscard]] Eigen::Matrix3d R_machine_tracker(const TrackerModel& model);
 
-/// The measured position of the target at time `at`, that of the machine or of a nest; `index` selects the random numbers of the
-/// noise.
+/// The measured position of the target at time `at`, that of the machine or of a nest; `index`
+/// selects the random numbers of the noise.
 [[nodiscard]] TrackerView observe(const TrackerModel& model, const VirtualMachine& machine,
                                   HostTime at, std::uint64_t index);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// A TruthMachine that moves along its path, or follows a control: the scale readings and the target
-/// position at any host time. Until the time set by start() it stands at the first vertex of the
-/// path; with a control that has sent no position it stands there, too. Thread-safe.
+/// A TruthMachine that moves along its path, or follows a control: the scale readings and the
+/// target position at any host time. Until the time set by start() it stands at the first vertex of
+/// the path; with a control that has sent no position it stands there, too. Thread-safe.
 
 #include <atomic>
 #include <cstdint>

@@ -21,8 +21,8 @@ namespace abbe::daemon {
 [[nodiscard]] std::optional<std::string> user_from_name_service(uid_t uid);
 [[nodiscard]] std::optional<gid_t> group_from_name_service(const std::string& name);
 
-/// A user and its primary group. Reads /etc/passwd, then asks the name service, which may block: for
-/// the start of a program.
+/// A user and its primary group. Reads /etc/passwd, then asks the name service, which may block:
+/// for the start of a program.
 struct Account {
   uid_t uid = 0;
   gid_t gid = 0;

@@ -7,10 +7,10 @@
 ///         or  {"ok": false, "code": WORD, "error": TEXT}
 ///
 /// WORD is one of data_insufficient, usage, bad_input, io, refused, stop_not_confirmed,
-/// stop_not_sent; it determines the exit code of the client program. The server adds the name of the client's user, taken from the kernel
-/// (SO_PEERCRED), to every request as "user". A connection that the server closes because it is
-/// idle or to make place for a newer one gets a last line with "ok": false. Not for real-time
-/// threads.
+/// stop_not_sent; it determines the exit code of the client program. The server adds the name of
+/// the client's user, taken from the kernel (SO_PEERCRED), to every request as "user". A connection
+/// that the server closes because it is idle or to make place for a newer one gets a last line with
+/// "ok": false. Not for real-time threads.
 
 #include <sys/types.h>
 

@@ -21,8 +21,8 @@ class WallClock {
   [[nodiscard]] ClockReading read() const { return read_(); }
   [[nodiscard]] protocol::UtcTime now() const { return protocol::UtcTime{read_().utc}; }
   /// Dates of samples by the wall clock as it is now; `host_now`: the present host time. It differs
-  /// from the offset in recordings and messages, which is that of the start, if the clock was set or
-  /// the computer suspended.
+  /// from the offset in recordings and messages, which is that of the start, if the clock was set
+  /// or the computer suspended.
   [[nodiscard]] protocol::UtcOffset offset(protocol::HostTime host_now) const {
     return {now().time_since_epoch() - host_now.time_since_epoch()};
   }

@@ -2,7 +2,7 @@
 /// Errors of the module calib. Pure.
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/error.hpp"
+#include "abbe/calib/base/error.hpp"
 
 namespace abbe::daemon {
 

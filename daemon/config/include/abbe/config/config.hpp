@@ -17,8 +17,6 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/environment/refractive_index.hpp"
-#include "abbe/calib/otf/run.hpp"
 #include "abbe/config/device_configs.hpp"
 #include "abbe/config/meaning.hpp"
 #include "abbe/drivers/axis_kind.hpp"
@@ -42,6 +40,9 @@ struct AxisConfig {
 /// Direction of a machine axis along which the vertical axis of a levelled tracker points.
 enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
 
+/// Of error tables between their nodes.
+enum class TableInterpolation { Linear, NaturalCubic, NotAKnotCubic };
+
 /// [machine], [axes.*], [target], [model], and the noise of the tracker: the input of an
 /// identification.
 struct MachineConfig {
@@ -55,7 +56,7 @@ struct MachineConfig {
   /// Nodes of every linear axis, ascending, from one end of travel to the other.
   std::map<std::string, std::vector<double>> nodes_m;
   /// [model] basis, of the tables that on-the-fly calibration identifies.
-  calib::estimation::Interpolation interpolation = calib::estimation::Interpolation::Linear;
+  TableInterpolation interpolation = TableInterpolation::Linear;
   double sigma_range_m = 2e-6;  ///< standard deviation of one tracker range
   /// Standard deviation of one tracker direction, perpendicular to the beam.
   double sigma_angle_rad = 3e-6;
@@ -82,10 +83,13 @@ struct ThermalConfig {
   double fixed_m = 0.0;  ///< reading where the scale is fixed to the machine
 };
 
+/// Of the refractive index.
+enum class AirEquation { Ciddor, Edlen, ShopFloor };
+
 /// [air]: the refractive index of air, computed from measured values.
 struct AirConfig {
-  calib::IndexEquation equation = calib::IndexEquation::Ciddor;
-  double wavelength_m = calib::kHeliumNeon_m;
+  AirEquation equation = AirEquation::Ciddor;
+  double wavelength_m = 633e-9;
   double co2_ppm = 450.0;
   double u_temperature_K = 0.2;
   double u_pressure_Pa = 30.0;
@@ -163,14 +167,15 @@ struct RecordingConfig {
 };
 
 /// [models]: which models the store keeps besides those in force. A model is removed only if it is
-/// neither among the newest nor younger than `keep`: a clock that is ahead removes none of the newest.
+/// neither among the newest nor younger than `keep`: a clock that is ahead removes none of the
+/// newest.
 struct ModelRetention {
   std::size_t keep_newest = 0;  ///< models added last that are kept at any age; 0: keep all
   std::chrono::hours keep{0};   ///< [models] keep_days; models that were added later are kept
 };
 
-/// Who runs abbe-dds. ByStart: systemd if abbed runs as abbed.service, else abbed itself; use_dds_unit()
-/// decides it.
+/// Who runs abbe-dds. ByStart: systemd if abbed runs as abbed.service, else abbed itself;
+/// use_dds_unit() decides it.
 enum class Supervise { ByStart, Child, Systemd, Off };
 
 /// [dds]
@@ -206,23 +211,35 @@ struct GateConfig {
   /// - "evemu-shape-only": a model from a ball array whose rotation about Ball1 is not referenced;
   /// - "smaller-volume": a model whose validity volume is smaller than that of the active model;
   /// - "scale-change": a model whose scale differs from that of the active model;
-  /// - "path-orientation": a path file that may be rotated (calib/otf/orientation);
-  /// - "bar-temperature": a bar more than 12 K from 20 C (calib/mfb/judge).
+  /// - "path-orientation": a path file that may be rotated;
+  /// - "bar-temperature": a bar more than 12 K from 20 C.
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;
 };
 
+enum class OtfMode { OnTheFly, Standstill };
+enum class OtfEstimator { TwoStep, Joint };
+/// Differences between both directions of travel: none, one per table, one per node.
+enum class OtfBacklash { None, PerTable, PerNode };
+
+/// [[tracker.nest]]: a reference nest beside the machine.
+struct NestConfig {
+  std::string name;
+  std::array<double, 3> position_tracker_m{};  ///< approximate, tracker frame
+  double radius_m = 10e-3;                     ///< a target closer to the position is in the nest
+};
+
 /// [otf]: calibration with a laser tracker along a path.
 struct OtfConfig {
-  calib::otf::Mode mode = calib::otf::Mode::OnTheFly;  ///< unless a request names another one
-  /// See calib::otf::StandstillOptions.
-  double u_repeatability_m = calib::otf::StandstillOptions{}.u_repeatability_m;
-  calib::otf::Estimator estimator = calib::otf::Estimator::Joint;  ///< of on-the-fly mode
-  /// See calib::otf::Options.
-  calib::estimation::TravelDependence backlash = calib::otf::Options{}.backlash;
-  calib::otf::NestOptions nests{};  ///< [[tracker.nest]]
-  std::optional<calib::otf::SmoothnessOptions> smoothness{};
+  OtfMode mode = OtfMode::OnTheFly;              ///< unless a request names another one
+  double u_repeatability_m = 0.5e-6;             ///< of one standstill, per component
+  OtfEstimator estimator = OtfEstimator::Joint;  ///< of on-the-fly mode
+  OtfBacklash backlash = OtfBacklash::None;
+  std::vector<NestConfig> nests{};
+  double u_nest_repeatability_m = 3e-6;  ///< of one visit of a nest, per coordinate
+  /// Prior for smooth tables of X, Y, Z: bend over three nodes 50 mm apart; 0: none of this axis.
+  std::optional<std::array<double, 3>> smoothness_m{};
 };
 
 /// [drift]: comparison of the tables of a new run with those of the active model, and continuous
@@ -253,8 +270,8 @@ struct ArtefactTemperatureConfig {
 
 /// [evemu]: calibration with a ball array.
 struct EvemuConfig {
-  std::string estimator = "bayes-pose";  ///< one of calib::evemu::estimator()
-  std::string folds = "position";        ///< one of calib::evemu::folds_by(): for lasso, mcp, scad
+  std::string estimator = "bayes-pose";  ///< bayes-pose, ols, ridge, lasso, mcp, scad
+  std::string folds = "position";        ///< position, ball, row: for lasso, mcp, scad
   int order = 3;                         ///< of the polynomials
   /// Positions of the array, in the order in which they are touched.
   std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};

@@ -51,8 +51,8 @@ struct MeaningDifference {
   /// "[TABLE] was configured, is not": tables and elements that only one of the lists has.
   std::vector<std::string> tables;
   std::vector<std::string> changed;  ///< "[TABLE] X step_nm was 10, is 11"
-  /// Entries that only the present list has, of tables and elements that both lists have. An earlier
-  /// version of abbe did not have them.
+  /// Entries that only the present list has, of tables and elements that both lists have. An
+  /// earlier version of abbe did not have them.
   MeaningEntries added;
 };
 [[nodiscard]] MeaningDifference difference(const MeaningEntries& before,

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/error_lattice.hpp"
+#include "abbe/calib/model/error_lattice.hpp"
 #include "abbe_v1.h"
 
 namespace abbe::dds {

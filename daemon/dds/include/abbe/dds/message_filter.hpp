@@ -20,16 +20,17 @@
 /// - Messages with another structure than that of DDS Security (protected_structure.hpp).
 ///
 /// Without DDS Security, from any matched writer:
-/// - A sample without content: an instance is disposed or unregistered. Fast DDS aborts if it cannot
-///   find its key. abbe's subscribers do not need such samples; the filter replaces them by a GAP,
-///   so that a reliable reader does not wait for them. Key hashes are blanked: Fast DDS then reads
-///   the key from the content.
+/// - A sample without content: an instance is disposed or unregistered. Fast DDS aborts if it
+///   cannot find its key. abbe's subscribers do not need such samples; the filter replaces them by
+///   a GAP, so that a reliable reader does not wait for them. Key hashes are blanked: Fast DDS then
+///   reads the key from the content.
 ///   So are samples of another encapsulation than plain CDR.
 /// - Fragments of samples, which Fast DDS checks insufficiently. A message of abbe fits into one
 ///   datagram, so the filter skips those of users' writers.
 /// - A GAP of more numbers than any history covers, which Fast DDS marks one by one; GAPs and
-///   samples of numbers that no reader can use yet, which it keeps (sequence_window.hpp). A heartbeat
-///   that skips millions of numbers, which it counts one by one, is changed to skip fewer.
+///   samples of numbers that no reader can use yet, which it keeps (sequence_window.hpp). A
+///   heartbeat that skips millions of numbers, which it counts one by one, is changed to skip
+///   fewer.
 /// - Sequence numbers that Fast DDS cannot add to without an assertion.
 /// - Time stamps: a sample dated in the future would keep later ones out of the history. The filter
 ///   takes all of them away; the readers have the time of reception.

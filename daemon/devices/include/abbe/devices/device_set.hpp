@@ -1,7 +1,7 @@
 #pragma once
 /// All configured devices with their rings and threads, as one sample source for the hub. Each
-/// device runs its own thread. All functions except end_machine(), stop_machine() and machine_stop()
-/// must be called from the hub's thread.
+/// device runs its own thread. All functions except end_machine(), stop_machine() and
+/// machine_stop() must be called from the hub's thread.
 
 #include <array>
 #include <chrono>

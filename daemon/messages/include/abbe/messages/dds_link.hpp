@@ -40,8 +40,8 @@ struct DdsLinkCounters {
       0;  ///< connections of other processes or users, closed at once
 };
 
-/// Which process may connect, as the kernel reports it (SO_PEERCRED): the supervised abbe-dds; without
-/// supervision, any process of `user`.
+/// Which process may connect, as the kernel reports it (SO_PEERCRED): the supervised abbe-dds;
+/// without supervision, any process of `user`.
 struct DdsLinkPeer {
   /// The supervised process; null without supervision. Must outlive the link, which records in it
   /// the times of beats and answers.

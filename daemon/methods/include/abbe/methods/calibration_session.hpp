@@ -18,8 +18,8 @@
 ///          +-----gate failed--> refused
 ///
 /// The states are the same for every method; only the acquisition differs (OtfAcquisition,
-/// EvemuAcquisition, MfbAcquisition). If the method guides the operator from touch to touch, each new instruction
-/// is also an event. Not for the RT path; not thread-safe.
+/// EvemuAcquisition, MfbAcquisition). If the method guides the operator from touch to touch, each
+/// new instruction is also an event. Not for the RT path; not thread-safe.
 
 #include <cstdint>
 #include <optional>
@@ -70,8 +70,9 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// only: in a replay the run is incomplete without it and gives no model either.
   void tick(protocol::HostTime now);
 
-  /// What was added to the run since the last call, for tables while the machine moves. nullopt: the
-  /// session is not acquiring, or its method has no such tables. Has no influence on the session.
+  /// What was added to the run since the last call, for tables while the machine moves. nullopt:
+  /// the session is not acquiring, or its method has no such tables. Has no influence on the
+  /// session.
   [[nodiscard]] std::optional<RunNews> take_news();
   /// The acquired run, available in the state Identifying; nullopt in other states and after it was
   /// returned once.

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/gate.hpp"
-#include "abbe/calib/model_drift.hpp"
-#include "abbe/calib/model_update.hpp"
+#include "abbe/calib/model/gate.hpp"
+#include "abbe/calib/model/model_drift.hpp"
+#include "abbe/calib/model/model_update.hpp"
 #include "abbe/methods/calibration_run.hpp"
 
 namespace abbe::daemon {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abbe/calib/gate.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon {
@@ -23,9 +23,10 @@ struct RunResidual {
   double sigma_m = 0.0;  ///< standard uncertainty; 0: not known
 };
 
-/// Adds the figures of each part, the series and the counts of all residuals, which are in the order
-/// of the run. The series is over time if all residuals have one. A residual that is not finite and
-/// a part without residuals are left out. Of more than kMostParts parts, neighbours are combined.
+/// Adds the figures of each part, the series and the counts of all residuals, which are in the
+/// order of the run. The series is over time if all residuals have one. A residual that is not
+/// finite and a part without residuals are left out. Of more than kMostParts parts, neighbours are
+/// combined.
 void add_residuals(RunFigures& run, std::string_view part_kind,
                    const std::vector<std::string>& part_names,
                    std::span<const RunResidual> residuals);

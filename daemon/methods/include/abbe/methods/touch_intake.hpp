@@ -1,7 +1,7 @@
 #pragma once
-/// What the guided acquisitions of all methods with a touch probe have in common: the touches of the
-/// run, notes on them, and the ends of a run that do not depend on the method. Decisions depend on
-/// snapshots only; only pause() is given the time. Not for the RT path; not thread-safe.
+/// What the guided acquisitions of all methods with a touch probe have in common: the touches of
+/// the run, notes on them, and the ends of a run that do not depend on the method. Decisions depend
+/// on snapshots only; only pause() is given the time. Not for the RT path; not thread-safe.
 
 #include <array>
 #include <chrono>

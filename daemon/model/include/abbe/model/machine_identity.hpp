@@ -6,7 +6,8 @@
 /// A copied data folder would give two machines one identity. So the file also holds marks of the
 /// computer on which it was made or confirmed: hashes of /etc/machine-id and of the permanent
 /// addresses of its network cards, because a cloned disk has the same /etc/machine-id. On another
-/// computer the identity is not confirmed, and no model becomes ACTIVE, before a person has decided:
+/// computer the identity is not confirmed, and no model becomes ACTIVE, before a person has
+/// decided:
 /// this is the same machine with another computer ("keep"), or another machine ("new"). A computer
 /// without both marks, such as a container, is not recognised, and changes nothing.
 ///
@@ -40,8 +41,8 @@ struct ComputerMarks {
 
 enum class IdentityAction { Made, Kept, Renewed };
 
-/// A place in the events of the model store. A date does not order events: the clock of the computer
-/// may be wrong, or set.
+/// A place in the events of the model store. A date does not order events: the clock of the
+/// computer may be wrong, or set.
 struct StorePlace {
   std::size_t events = 0;  ///< number of events before the place
   std::string last;        ///< the last of them, id and date; empty: there is none
@@ -72,9 +73,10 @@ struct MachineIdentity {
   [[nodiscard]] std::string machine_id_at(protocol::UtcTime time) const;
 };
 
-/// The models that neither a person nor the gate activated after the renewal, sorted: they are of the
-/// machine from which the data folder was copied. A roll-back accepts no model. `history`: all events
-/// of the store. Where these are not those of the renewal (the store was made again), dates decide.
+/// The models that neither a person nor the gate activated after the renewal, sorted: they are of
+/// the machine from which the data folder was copied. A roll-back accepts no model. `history`: all
+/// events of the store. Where these are not those of the renewal (the store was made again), dates
+/// decide.
 [[nodiscard]] std::vector<std::string> models_of_other_machine(const MachineIdentity& identity,
                                                                std::span<const StoreEvent> history);
 /// The machine_id when model `id` was added to the store; nullopt: the store has no such event.

@@ -13,9 +13,9 @@
 
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/environment/thermal_expansion.hpp"
-#include "abbe/calib/offset_in_model.hpp"
-#include "abbe/calib/otf/backlash.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/backlash.hpp"
+#include "abbe/calib/model/offset_in_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/model/model_verdict.hpp"
 #include "abbe/model/run_figures.hpp"
@@ -47,7 +47,7 @@ struct ModelStatistics {
   friend bool operator==(const ModelStatistics&, const ModelStatistics&) = default;
 };
 
-/// Drift of the tracker estimated with reference nests (calib/otf/tracker_drift.hpp).
+/// Drift of the tracker estimated with reference nests (calib/otf/samples/tracker_drift.hpp).
 struct TrackerDriftFigures {
   calib::Vector3 largest_m = calib::Vector3::Zero();  ///< machine axes, at the centre of the path
   double u_repeatability_m = 0.0;                     ///< of a visit of a nest, as used
@@ -104,7 +104,7 @@ struct ModelDocument {
   /// Of method otf with backlash: the differences that the run determined, for people. All of them
   /// are in model.travel(), on which V depends; models of earlier versions have only this list. It
   /// is not in the hash.
-  std::vector<calib::otf::Backlash> backlash{};
+  std::vector<calib::Backlash> backlash{};
   /// Of method otf with reference nests. Not in the hash, as other statistics.
   std::optional<TrackerDriftFigures> tracker_drift{};
   /// Of method mfb. Not in the hash, as other statistics.
@@ -152,12 +152,12 @@ struct ModelDocument {
 
 /// CSV with the columns `name,value,u,unit`: the coefficients of [Li OMM] Table 3 in mm and rad,
 /// for a polynomial model.
-[[nodiscard]] std::string to_coefficients_csv(const calib::evemu::EvemuModel& model);
+[[nodiscard]] std::string to_coefficients_csv(const calib::PolynomialModel& model);
 
 /// CSV with the columns `name,position_mm,value,u,unit`: tables and squareness, then backlash
 /// (`EXX.backlash`).
 [[nodiscard]] std::string to_tables_csv(const calib::VolumetricModel& model,
-                                        std::span<const calib::otf::Backlash> backlash = {});
+                                        std::span<const calib::Backlash> backlash = {});
 
 /// Note in the verdict if a candidate is not compared with the active model.
 inline constexpr std::string_view kOfAnotherMachine =

@@ -24,8 +24,8 @@
 
 namespace abbe::daemon {
 
-/// Drifted: a run found that the machine has changed since the model, which was active. Removed: the
-/// file of the model was removed because the store keeps a limited number of models.
+/// Drifted: a run found that the machine has changed since the model, which was active. Removed:
+/// the file of the model was removed because the store keeps a limited number of models.
 enum class StoreAction { Added, Activated, Forced, RolledBack, Drifted, Removed };
 
 struct StoreEvent {
@@ -106,8 +106,8 @@ class ModelStore {
   [[nodiscard]] Result<void> add_drift(const std::string& id, const StoreActor& actor);
 
   /// Activates the model that was active before `active`; returns its id. Refused if another model
-  /// than `active` is active: a request that is repeated because its answer was lost must not go one
-  /// model further back. Refused if no model was active before.
+  /// than `active` is active: a request that is repeated because its answer was lost must not go
+  /// one model further back. Refused if no model was active before.
   [[nodiscard]] Result<std::string> rollback(const StoreActor& actor, const std::string& active);
 
   /// Removes the models that `retention` does not keep; returns their ids, oldest first. The active

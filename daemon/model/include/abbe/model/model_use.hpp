@@ -1,8 +1,8 @@
 #pragma once
-/// What stands against the use of a model, and what its user must know. Everything that lets a model
-/// leave abbe (control files, certificates, reports, the page, Python) asks here, so that a state
-/// that one part knows is not lost in the next. A new obstacle is added in obstacles_to_use() only.
-/// Pure.
+/// What stands against the use of a model, and what its user must know. Everything that lets a
+/// model leave abbe (control files, certificates, reports, the page, Python) asks here, so that a
+/// state that one part knows is not lost in the next. A new obstacle is added in obstacles_to_use()
+/// only. Pure.
 
 #include <optional>
 #include <span>
@@ -22,7 +22,8 @@ enum class ModelPurpose { Control, Certificate, Look };
 struct ModelInUse {
   const ModelDocument& document;         ///< with the verdict of its file or store
   std::span<const StoreEvent> events{};  ///< of this model, oldest first; empty: it is in no store
-  /// machine_hash() of the configuration of the machine that will use the model; nullopt: not known.
+  /// machine_hash() of the configuration of the machine that will use the model; nullopt: not
+  /// known.
   std::optional<std::string> machine_hash{};
   ModelPurpose purpose = ModelPurpose::Control;
   /// identity_doubt() of the store of the model; empty: there is none, or no identity is known.
@@ -40,8 +41,9 @@ struct Obstacles {
 };
 [[nodiscard]] Obstacles obstacles_to_use(const ModelInUse& use);
 
-/// What a file that is made of the model states: the refusals, with who forced the use and why, then
-/// the statements. Refused with all refusals if there are any and `forced` is empty; `what` was tried:
+/// What a file that is made of the model states: the refusals, with who forced the use and why,
+/// then the statements. Refused with all refusals if there are any and `forced` is empty; `what`
+/// was tried:
 /// "export model.json".
 [[nodiscard]] Result<std::vector<std::string>> statements_of_use(
     const std::string& what, const Obstacles& obstacles, const std::optional<StoreActor>& forced);

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abbe/calib/gate.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {

@@ -1,6 +1,7 @@
 #pragma once
 /// What a run left when its model was identified, for the report. It is in model.json, so that the
-/// report can be made again at any time, and not in the hash of the model. Every part may be absent:
+/// report can be made again at any time, and not in the hash of the model. Every part may be
+/// absent:
 /// models of earlier versions have less.
 
 #include <array>
@@ -9,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 #include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {
@@ -82,8 +83,8 @@ struct RunFigures {
   /// Of the verdict, in models of earlier versions; see ModelVerdict::notes.
   std::vector<std::string> notes;
   std::vector<Interval> residuals;  ///< of a run along a path, else empty
-  /// Where was measured, polylines of scale readings: the driven path of each run, the balls of each
-  /// position of an array, the bar in each of its positions.
+  /// Where was measured, polylines of scale readings: the driven path of each run, the balls of
+  /// each position of an array, the bar in each of its positions.
   std::vector<std::vector<calib::Vector3>> places_m{};
   std::string part_kind{};  ///< "leg", "position", "measurement"
   std::vector<Part> parts{};

@@ -25,8 +25,8 @@ struct RawFromDevice {
 /// follow, which only marks further axes of the first sample as missing.
 inline constexpr const char* kAxisSamplesRule = "axis_samples";
 
-/// Key in the version entries of a recording. With it, a rotary axis of [encoder] began in its travel.
-/// Without it (older versions of abbe), its first count was used as sent.
+/// Key in the version entries of a recording. With it, a rotary axis of [encoder] began in its
+/// travel. Without it (older versions of abbe), its first count was used as sent.
 inline constexpr const char* kRotaryTravelRule = "rotary_travel";
 
 struct Batch {

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/calib/environment/refractive_index.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/pipeline/batch.hpp"
 #include "abbe/pipeline/sensor_checks.hpp"

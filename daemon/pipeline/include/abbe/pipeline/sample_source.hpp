@@ -42,8 +42,8 @@ class SampleSource {
   /// effect without a measuring machine.
   virtual void measure(std::span<const drivers::ProbePoint>) {}
   /// Stops a motion of the measuring machine (AbortE) and discards all requested points. Returns
-  /// the number of the request; machine_stop() has its outcome. May be called from any thread; takes
-  /// no lock. Refused without a measuring machine.
+  /// the number of the request; machine_stop() has its outcome. May be called from any thread;
+  /// takes no lock. Refused without a measuring machine.
   [[nodiscard]] virtual Result<std::uint64_t> stop_machine() {
     return fail(ErrorCode::Refused, "machine: there is no measuring machine, " +
                                         tables_with(Capability::Motion) + ", in the configuration");

@@ -1,6 +1,8 @@
 #pragma once
-/// A person states that a sensor whose readings are refused is right. Its history is then discarded:
-/// it is used when its next readings agree with each other. Recorded, so that a replay does the same.
+/// A person states that a sensor whose readings are refused is right. Its history is then
+/// discarded:
+/// it is used when its next readings agree with each other. Recorded, so that a replay does the
+/// same.
 
 #include <string>
 #include <string_view>

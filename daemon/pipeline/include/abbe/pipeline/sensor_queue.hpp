@@ -1,9 +1,9 @@
 #pragma once
 /// Passes environment samples to SensorChecks in an order that does not depend on their arrival, so
-/// that pipeline, live view, recorder and replay come to the same values. A sample of an environment
-/// device is due `lag` after its instant: by then the earlier ones of all devices have arrived. A
-/// sample of the tracker's weather station is due in the cycle that took it. Deterministic; not for
-/// the RT path; not thread-safe.
+/// that pipeline, live view, recorder and replay come to the same values. A sample of an
+/// environment device is due `lag` after its instant: by then the earlier ones of all devices have
+/// arrived. A sample of the tracker's weather station is due in the cycle that took it.
+/// Deterministic; not for the RT path; not thread-safe.
 
 #include <chrono>
 #include <cstddef>

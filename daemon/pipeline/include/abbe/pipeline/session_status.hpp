@@ -68,8 +68,8 @@ struct RequestedTouch {
   std::string on;           ///< the feature: "ball 3", "hole 4"
   std::size_t touched = 0;  ///< points taken on this feature
   std::size_t points = 0;   ///< points planned on this feature
-  /// In measuring order; null: not a ball array. Shared with replies that other threads write; never
-  /// changed.
+  /// In measuring order; null: not a ball array. Shared with replies that other threads write;
+  /// never changed.
   std::shared_ptr<const std::vector<FeatureToTouch>> features{};
 };
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 
 namespace abbe::daemon {
 

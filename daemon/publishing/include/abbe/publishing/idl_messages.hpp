@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "abbe/calib/offset_in_model.hpp"
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/offset_in_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 #include "abbe/drivers/device.hpp"
 #include "abbe/pipeline/session_status.hpp"
 #include "abbe/protocol/samples.hpp"

@@ -1,7 +1,7 @@
 #pragma once
-/// What happened to the wall clock while a recording was written. The dates of its messages come from
-/// one offset, taken at the start of abbed; an attachment states how far the clock was away from
-/// them later.
+/// What happened to the wall clock while a recording was written. The dates of its messages come
+/// from one offset, taken at the start of abbed; an attachment states how far the clock was away
+/// from them later.
 
 #include "abbe/base/clock_steps.hpp"
 #include "abbe/messages/recording_info.hpp"

@@ -15,8 +15,8 @@ namespace abbe::daemon {
 
 /// The details are those of `as_found`. BadInput with all entries that are missing or invalid, also
 /// dates that contradict each other or the models; entries say which measurement it is about.
-/// Refused if a model must not be used (model_use.hpp) and its `forced` is empty; the certificate of
-/// a forced one states this first. DataInsufficient as model_report().
+/// Refused if a model must not be used (model_use.hpp) and its `forced` is empty; the certificate
+/// of a forced one states this first. DataInsufficient as model_report().
 [[nodiscard]] Result<std::string> calibration_certificate(
     const ReportSubject& as_found, const std::optional<ReportSubject>& as_left = {});
 

@@ -39,8 +39,8 @@ struct CertificateDetails {
   /// are absent, those that the run recorded are stated.
   std::optional<double> temperature_C, u_temperature_K, humidity_percent, feed_mm_per_min;
   std::vector<EquipmentDetails> equipment;
-  /// When the certificate is made: later dates of issue and identification are refused. nullopt: not
-  /// known.
+  /// When the certificate is made: later dates of issue and identification are refused. nullopt:
+  /// not known.
   std::optional<protocol::UtcTime> now{};
 };
 

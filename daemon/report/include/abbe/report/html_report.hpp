@@ -1,6 +1,6 @@
 #pragma once
-/// Builds an HTML page that explains a result: text, tables and figures. The page is one file, needs
-/// no network and has no JavaScript: all figures are SVG. One thread.
+/// Builds an HTML page that explains a result: text, tables and figures. The page is one file,
+/// needs no network and has no JavaScript: all figures are SVG. One thread.
 
 #include <cstddef>
 #include <optional>

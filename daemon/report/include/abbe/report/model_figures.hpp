@@ -6,14 +6,14 @@
 #include <span>
 #include <vector>
 
-#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/calib/model/volumetric_model.hpp"
 #include "abbe/model/run_figures.hpp"
 #include "abbe/report/html_report.hpp"
 
 namespace abbe::daemon {
 
 /// What is left of one observation to which a model was not fitted, without the rigid motion that
-/// fits best to the observations held out together with it (calib/otf/judge.hpp).
+/// fits best to the observations held out together with it (calib/otf/judge/judge.hpp).
 struct LeftError {
   calib::Vector3 axis_position_m = calib::Vector3::Zero();
   double before_m = 0.0;  ///< without compensation

@@ -23,7 +23,8 @@ struct ReportSubject {
   std::optional<std::string> machine_hash{};  ///< ModelInUse::machine_hash
   /// Who had a certificate of the model made although it must not be used, and why.
   std::optional<StoreActor> forced{};
-  /// Of the machine, when the model was identified; empty: the store is not in a data folder of abbed.
+  /// Of the machine, when the model was identified; empty: the store is not in a data folder of
+  /// abbed.
   std::string machine_id{};
   std::string identity_doubt{};  ///< ModelInUse::identity_doubt
 };

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 
 namespace abbe::daemon {
 

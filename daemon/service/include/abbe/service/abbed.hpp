@@ -44,8 +44,8 @@ class Abbed {
   /// True if the hub began a cycle within the last second. If false, the caller must not notify
   /// systemd's watchdog, which then restarts abbed.
   [[nodiscard]] bool alive() const;
-  /// Stops a measuring machine that moves; it then awaits a release. Takes no lock. Call it when the
-  /// hub is not alive: the hub can no longer stop the machine when its operator is gone.
+  /// Stops a measuring machine that moves; it then awaits a release. Takes no lock. Call it when
+  /// the hub is not alive: the hub can no longer stop the machine when its operator is gone.
   void stop_machine();
   /// Warnings of the start, one log line each.
   [[nodiscard]] std::vector<std::string> warnings() const;

@@ -26,8 +26,8 @@
 ///
 /// "machine" with "stop" returns "stop", the number of the request. "machine" and "status" (as
 /// "machine_stop") contain the latest one: {"number", "outcome", "text"}; so does "touches", once a
-/// cancelled job has ended. "outcome" is "pending", "stopped" (AbortE was answered, or no motion was
-/// under way), "not confirmed" (refused, not answered, connection lost) or "not sent" (no
+/// cancelled job has ended. "outcome" is "pending", "stopped" (AbortE was answered, or no motion
+/// was under way), "not confirmed" (refused, not answered, connection lost) or "not sent" (no
 /// connection). Repeat "machine" until the outcome of that number, or of a later one, is not
 /// "pending". After the last two the machine may be moving; AbortE is then the first command on the
 /// next connection.
@@ -41,19 +41,20 @@
 /// "status" contains it in the "orders" of "tracker", with "outcome" "running", "done", "refused"
 /// or "failed" and its "text".
 ///
-/// While a ball array is touched, "next" of "session" contains the "features" of the position: "on",
-/// the points "touched" of "points" and, as soon as the touches determine them, "at_m" (centre of a
-/// ball, or of the points on a block) and the "normal" of the face of a block, to the side that the
-/// calibrator states.
+/// While a ball array is touched, "next" of "session" contains the "features" of the position:
+/// "on", the points "touched" of "points" and, as soon as the touches determine them, "at_m"
+/// (centre of a ball, or of the points on a block) and the "normal" of the face of a block, to the
+/// side that the calibrator states.
 ///
 /// The server sets "user", the user who sends the request. The first 64 bytes of "who", if it
 /// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of
 /// "status" alone; "calibration" the "request" of the present or last session. "activate" and
-/// "rollback" change the model store, as `abbe model` does; the daemon follows the store. They return
-/// the "change" and, if it is done, the "id" of the active model; until then ask with "change".
-/// "rollback" is refused if another model than "active" is active: a request that is repeated because
-/// its answer was lost does not go one model further back. The calling thread reads the request and writes the answer. Hub::call() runs the part that needs the
-/// hub's thread; the duration of this part does not depend on the size of the request.
+/// "rollback" change the model store, as `abbe model` does; the daemon follows the store. They
+/// return the "change" and, if it is done, the "id" of the active model; until then ask with
+/// "change". "rollback" is refused if another model than "active" is active: a request that is
+/// repeated because its answer was lost does not go one model further back. The calling thread
+/// reads the request and writes the answer. Hub::call() runs the part that needs the hub's thread;
+/// the duration of this part does not depend on the size of the request.
 
 #include <chrono>
 #include <nlohmann/json.hpp>

@@ -5,8 +5,8 @@
 ///
 /// - STALE: the model was made for another machine configuration (hash), the axes have not all been
 ///   seen since the start, or there are no recent axis positions.
-/// - DRIFT: a run after the activation found that tables changed by more than their uncertainty, and
-///   no model was activated since.
+/// - DRIFT: a run after the activation found that tables changed by more than their uncertainty,
+///   and no model was activated since.
 /// - INVALID: the control itself corrects the axis readings, so the model would correct them twice.
 ///
 /// Not real-time; used by the hub's thread only.
@@ -76,8 +76,8 @@ class ModelAuthority {
                                              std::string_view why_not_known = {}) const;
   [[nodiscard]] const PublishedModel* active_model() const noexcept { return active_.model.get(); }
   /// The model with which the gate compares a new one: the active model, or null if the active
-  /// model was made for another machine configuration, or the identity of the machine does not allow
-  /// to use it.
+  /// model was made for another machine configuration, or the identity of the machine does not
+  /// allow to use it.
   [[nodiscard]] std::shared_ptr<const PublishedModel> comparison_model() const;
   /// Restricts comparison_model(). `identity` must exist at every later call; null: no restriction.
   void set_identity(const IdentityWatch* identity) noexcept { identity_ = identity; }

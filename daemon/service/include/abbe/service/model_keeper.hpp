@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "abbe/base/wall_clock.hpp"
-#include "abbe/calib/gate.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/model_store.hpp"

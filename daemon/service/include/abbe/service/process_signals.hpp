@@ -1,6 +1,6 @@
 #pragma once
-/// What signals and uncaught exceptions do to abbed. The rule: nothing that can be caught ends abbed
-/// while a measuring machine moves without AbortE.
+/// What signals and uncaught exceptions do to abbed. The rule: nothing that can be caught ends
+/// abbed while a measuring machine moves without AbortE.
 ///
 /// | | |
 /// | --- | --- |

@@ -1,6 +1,6 @@
 #pragma once
-/// Takes the statement of a person that a sensor is right, records it, and hands it to the next cycle
-/// of the hub. The hub's thread.
+/// Takes the statement of a person that a sensor is right, records it, and hands it to the next
+/// cycle of the hub. The hub's thread.
 
 #include <string>
 #include <utility>

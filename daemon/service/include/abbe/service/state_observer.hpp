@@ -1,8 +1,9 @@
 #pragma once
 /// Compares successive states of the daemon's parts and gives one journal entry for each change.
-/// Parts: devices, stops of a measuring machine, recorder, model store, DDS link, session, model, abbe-dds and the hub. Reads no
-/// clock and writes nothing. The rate is limited: each part may have kBurst entries at once, then
-/// one entry per kRefill, with the number of changes that were not logged.
+/// Parts: devices, stops of a measuring machine, recorder, model store, DDS link, session, model,
+/// abbe-dds and the hub. Reads no clock and writes nothing. The rate is limited: each part may have
+/// kBurst entries at once, then one entry per kRefill, with the number of changes that were not
+/// logged.
 
 #include <chrono>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
-/// Changes which model of the store is active, for clients that may not write to the store. A change
-/// runs on an ordinary thread, because the store's lock may be held by another process: a request,
-/// for example a stop, must not wait for it. One change at a time. Thread-safe.
+/// Changes which model of the store is active, for clients that may not write to the store. A
+/// change runs on an ordinary thread, because the store's lock may be held by another process: a
+/// request, for example a stop, must not wait for it. One change at a time. Thread-safe.
 
 #include <chrono>
 #include <cstdint>
@@ -36,8 +36,8 @@ class StoreChanges {
   /// Begins a change and returns its number. Usage for a forced activation without reason; Refused
   /// while another change runs.
   [[nodiscard]] Result<std::uint64_t> activate(Activation asked);
-  /// The same for the model that was active before `active`; the outcome is Refused if another model
-  /// than `active` is active.
+  /// The same for the model that was active before `active`; the outcome is Refused if another
+  /// model than `active` is active.
   [[nodiscard]] Result<std::uint64_t> roll_back(RollBack asked);
 
   /// Waits at most `patience` for the change. The id of the model that is active then, or the Error

@@ -12,7 +12,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/tables/input_files.hpp"
 

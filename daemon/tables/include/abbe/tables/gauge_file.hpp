@@ -9,7 +9,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/mfb/bar_calibration.hpp"
+#include "abbe/calib/mfb/identify/bar_calibration.hpp"
 
 namespace abbe::daemon {
 

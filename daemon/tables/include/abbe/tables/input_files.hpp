@@ -18,8 +18,8 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/estimation/machine_state.hpp"
-#include "abbe/calib/otf/run.hpp"
+#include "abbe/calib/geometry/machine_state.hpp"
+#include "abbe/calib/otf/run/run.hpp"
 #include "abbe/calib/verify/observe.hpp"
 
 namespace abbe::daemon {
@@ -48,8 +48,8 @@ struct TimesOfFile {
 
 /// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]`,
 /// `time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm[,status]`, or `time_s,x_mm,y_mm,z_mm[,status]` in
-/// a frame that the file does not state: see place_tracker(). Status of the device: 0 valid, 1 speed
-/// warning (valid); a point with another status remains in the sequence but is not used.
+/// a frame that the file does not state: see place_tracker(). Status of the device: 0 valid, 1
+/// speed warning (valid); a point with another status remains in the sequence but is not used.
 struct TrackerFile {
   InputFile source;
   std::vector<calib::otf::TrackerObservation> points;  ///< times: since the first point
@@ -74,8 +74,8 @@ struct TrackerFile {
 [[nodiscard]] Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
                                                    const ReadProgress& progress = {});
 
-/// One row of encoder.csv: `time_s,x_mm,y_mm,z_mm`, time of the machine's clock since the first row,
-/// and scale readings.
+/// One row of encoder.csv: `time_s,x_mm,y_mm,z_mm`, time of the machine's clock since the first
+/// row, and scale readings.
 struct EncoderRow {
   double time_s = 0.0;
   AxisPosition reading_m{};
@@ -93,7 +93,7 @@ struct EncoderFile {
 struct PointsFile {
   InputFile source;
   std::vector<AxisPosition> points_m;
-  std::vector<calib::estimation::AxisTravel> travel;  ///< empty without the columns dx, dy, dz
+  std::vector<calib::AxisTravel> travel;  ///< empty without the columns dx, dy, dz
 };
 [[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
 

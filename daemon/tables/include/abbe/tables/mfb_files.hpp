@@ -12,9 +12,9 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/axis_table.hpp"
-#include "abbe/calib/mfb/bar.hpp"
-#include "abbe/calib/mfb/measurement.hpp"
+#include "abbe/calib/geometry/axis_table.hpp"
+#include "abbe/calib/mfb/run/bar.hpp"
+#include "abbe/calib/mfb/run/measurement.hpp"
 #include "abbe/config/config.hpp"
 
 namespace abbe::daemon {
@@ -49,8 +49,8 @@ struct BarPointsFile {
   InputFile source;
   std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
   std::vector<std::vector<std::size_t>> lines;  ///< of each touch in the file, as in `passes`
-  /// A line with file, line and column for each measurement whose rows run against its `pass`. A bar
-  /// that lies turned may look like that, so that it is no fault of the file yet.
+  /// A line with file, line and column for each measurement whose rows run against its `pass`. A
+  /// bar that lies turned may look like that, so that it is no fault of the file yet.
   std::vector<std::string> against_pass;
 };
 [[nodiscard]] Result<BarPointsFile> read_bar_points_csv(const std::filesystem::path& file,

@@ -9,7 +9,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 
 namespace abbe::daemon {
 
@@ -58,8 +58,8 @@ struct PartsFile {
   std::vector<BarFiles> bars;
 };
 
-/// BadInput without a run, with fewer than two parts, if two parts have one name, or if runs with the
-/// same range_offset have different instruments.
+/// BadInput without a run, with fewer than two parts, if two parts have one name, or if runs with
+/// the same range_offset have different instruments.
 [[nodiscard]] Result<PartsFile> read_parts_toml(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
 #include "abbe/tables/evemu_files.hpp"
 
 namespace abbe::daemon {

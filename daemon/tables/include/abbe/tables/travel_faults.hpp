@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/geometry.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
 #include "abbe/config/config.hpp"
 
 namespace abbe::daemon {

@@ -78,8 +78,8 @@ struct EncoderAxis {
   /// if it reports none, its revolution if it is a single-turn encoder, else 2^32 (2^64 for a
   /// position of 64 bits).
   std::uint64_t wrap_counts = 0;
-  /// Rotary: the middle of the travel, rad. The first count is moved by whole ranges (wrap_counts) so
-  /// that its reading is next to it. None: the first count is used as sent.
+  /// Rotary: the middle of the travel, rad. The first count is moved by whole ranges (wrap_counts)
+  /// so that its reading is next to it. None: the first count is used as sent.
   std::optional<double> middle{};
   std::optional<std::uint32_t> serial{};  ///< compared with the encoder's if set
 };

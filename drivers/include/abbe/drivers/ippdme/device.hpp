@@ -44,10 +44,10 @@ struct IppDeviceOptions {
   std::uint16_t port = ippdme::kPort;
   IppSessionOptions session;  ///< `peer` is made from name, host and port
   IppReceiverOptions receiver;
-  /// Called on the device thread at every change of the state: before the first command of a motion,
-  /// when the machine has stopped, when a hold begins or ends. A hold: the machine awaits a release
-  /// by an operator. It must not wait: AbortE is sent by the same thread. Let another thread store
-  /// the value, and pass it in session.held and session.moving after a restart.
+  /// Called on the device thread at every change of the state: before the first command of a
+  /// motion, when the machine has stopped, when a hold begins or ends. A hold: the machine awaits a
+  /// release by an operator. It must not wait: AbortE is sent by the same thread. Let another
+  /// thread store the value, and pass it in session.held and session.moving after a restart.
   std::function<void(const IppMachine&)> machine_changed;
   /// Whether the latest value of machine_changed is stored. Called on the device thread; must not
   /// wait. A motion is sent only after its state is stored; one whose state cannot be stored is not

@@ -7,8 +7,8 @@
 ///     -> Configuring (IsHomed [Home], SetTool, OnPtMeasReport, OnMoveReportE)
 ///     -> Ready -> Storing -> Measuring -> Ready
 ///
-///   Storing: the owner stores that a motion is under way; the motion is sent after IppMotionStored.
-///   Home, which is sent in Configuring, is stored in the same way.
+///   Storing: the owner stores that a motion is under way; the motion is sent after
+///   IppMotionStored. Home, which is sent in Configuring, is stored in the same way.
 ///
 ///   any with an unfinished motion -> Aborting (AbortE) -> AwaitingRelease   (for every cause)
 ///   any -> AwaitingRelease                     (after an error of severity 2 or more)
@@ -29,8 +29,8 @@
 /// sent in the first session and after a release, but not if only the connection was lost.
 ///
 /// While no point is measured, the position is requested once per poll period; this request also
-/// checks that the server still answers. Points are accepted in Ready, Storing and Measuring. In any
-/// other state they are discarded, which is a fault.
+/// checks that the server still answers. Points are accepted in Ready, Storing and Measuring. In
+/// any other state they are discarded, which is a fault.
 
 #include <array>
 #include <chrono>
@@ -80,8 +80,8 @@ struct ProbePoint {
 
 /// Targets that are driven to in this order.
 using IppPath = std::vector<ProbePoint>;
-/// Error BadConfiguration for the first target that I++ DME cannot express: a position or a normal that is
-/// not finite or too large. The text names target, coordinate and value.
+/// Error BadConfiguration for the first target that I++ DME cannot express: a position or a normal
+/// that is not finite or too large. The text names target, coordinate and value.
 [[nodiscard]] Result<void> check(std::span<const ProbePoint> path);
 
 /// Outcome of a request to stop the machine.
@@ -130,7 +130,8 @@ struct IppConnectionLost {
 struct IppStopRequested {};  ///< ends the session
 /// Input: stop a motion, discard all points, and await a release whether or not the machine moved.
 struct IppAbortRequested {
-  /// Of the request; returned with the outcome. Requests of several threads may arrive out of order:
+  /// Of the request; returned with the outcome. Requests of several threads may arrive out of
+  /// order:
   /// the outcome has the highest number.
   std::uint64_t number = 0;
   std::string_view reason = "stopped by request";  ///< of the hold; a literal

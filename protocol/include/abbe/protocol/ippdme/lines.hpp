@@ -104,8 +104,8 @@ struct PointReport {
 /// Parses the data of a PointReport. Properties other than X, Y, Z and IJK are ignored.
 [[nodiscard]] tl::expected<PointReport, LineError> parse_point(std::string_view data) ABBE_RT;
 
-/// A number in the grammar of I++ DME, with at most 16 digits. nullopt: there is no such number (NaN,
-/// infinity, magnitude of 1e15 or more).
+/// A number in the grammar of I++ DME, with at most 16 digits. nullopt: there is no such number
+/// (NaN, infinity, magnitude of 1e15 or more).
 [[nodiscard]] std::optional<std::string> number_text(double value);
 
 class LineFramer {

@@ -33,8 +33,8 @@ struct ClampedBar {
 [[nodiscard]] ClampedBar clamped(const TrueBar& bar, std::span<const Measurement> plan,
                                  std::size_t m, const ProbingOptions& options);
 
-/// Distance between a tip with its centre at `tip_m` and the nearest surface that is touched: holes,
-/// rods and planes end as far beyond their touches as these are apart from their middle.
+/// Distance between a tip with its centre at `tip_m` and the nearest surface that is touched:
+/// holes, rods and planes end as far beyond their touches as these are apart from their middle.
 [[nodiscard]] double clearance_m(const ClampedBar& clamped, const Eigen::Vector3d& tip_m,
                                  double tip_radius_m);
 

@@ -1,9 +1,9 @@
 #pragma once
-/// The touches of a Multi-Feature Bar as a motion of the machine and edges of its probe, for devices
-/// on their wires. The machine passes the reading of every touch (probing.hpp) on a straight
-/// approach along the normal of the surface; the edge follows `delay_s` later. So the readings on the
-/// wire are those of points.csv, within jitter x feed. Collisions between two touches are not
-/// simulated. Pure; deterministic from the seed.
+/// The touches of a Multi-Feature Bar as a motion of the machine and edges of its probe, for
+/// devices on their wires. The machine passes the reading of every touch (probing.hpp) on a
+/// straight approach along the normal of the surface; the edge follows `delay_s` later. So the
+/// readings on the wire are those of points.csv, within jitter x feed. Collisions between two
+/// touches are not simulated. Pure; deterministic from the seed.
 
 #include <cstdint>
 #include <set>

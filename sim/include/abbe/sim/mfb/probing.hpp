@@ -5,9 +5,10 @@
 /// place of the tip = pose ( contact + growth + sag + shape ) + drift - pre-travel * normal
 ///
 /// contact: centre of the tip that touches the true surface on the line of the target; the part
-/// program is aligned to the bar, so these lines are in the frame of the bar. pose: as planned, plus
-/// the scatter of the clamping, by a rotation about the middle of the bar. The tip does not bend.
-/// Pure; deterministic from the seed: a touch has the same noise in any plan with the same order.
+/// program is aligned to the bar, so these lines are in the frame of the bar. pose: as planned,
+/// plus the scatter of the clamping, by a rotation about the middle of the bar. The tip does not
+/// bend. Pure; deterministic from the seed: a touch has the same noise in any plan with the same
+/// order.
 
 #include <span>
 #include <vector>

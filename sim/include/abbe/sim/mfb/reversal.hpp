@@ -1,9 +1,9 @@
 #pragma once
 /// The calibration of a Multi-Feature Bar by reversal on a simulated measuring machine: the bar is
 /// probed as it lies and turned by 180 degrees about its x axis, again and again, and a step gauge
-/// gives the positioning of the machine. Bar and gauge lie along X, or nearly. The faces of the gauge
-/// are planes across it; the tip touches them wherever its way leads. Pure; deterministic from the
-/// seed.
+/// gives the positioning of the machine. Bar and gauge lie along X, or nearly. The faces of the
+/// gauge are planes across it; the tip touches them wherever its way leads. Pure; deterministic
+/// from the seed.
 
 #include <optional>
 
@@ -56,7 +56,8 @@ struct ReversalRun {
 [[nodiscard]] TruthMachine measuring_machine(double mean_error_m, double bar_length_m,
                                              std::uint64_t seed);
 
-/// The passes without their touches, with the bar as it lies: in the middle of the travel of Y and Z.
+/// The passes without their touches, with the bar as it lies: in the middle of the travel of Y and
+/// Z.
 [[nodiscard]] std::vector<Measurement> reversal_plan(const TruthMachine& machine,
                                                      const ReversalOptions& options);
 

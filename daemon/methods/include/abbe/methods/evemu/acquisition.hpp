@@ -13,8 +13,8 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/axis_table.hpp"
-#include "abbe/calib/evemu/touch_guide.hpp"
+#include "abbe/calib/evemu/live/touch_guide.hpp"
+#include "abbe/calib/geometry/axis_table.hpp"
 #include "abbe/methods/evemu/artefact_thermometer.hpp"
 #include "abbe/methods/touch_intake.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"

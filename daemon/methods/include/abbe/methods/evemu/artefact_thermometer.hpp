@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "abbe/calib/evemu/artefact.hpp"
+#include "abbe/calib/evemu/run/artefact.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/protocol/samples.hpp"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/calib/evemu/solve/solve.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/evemu/identification.hpp"
 #include "abbe/model/model_document.hpp"

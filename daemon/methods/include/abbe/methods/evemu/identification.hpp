@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/evemu/judge/judge.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/evemu/acquisition.hpp"
 

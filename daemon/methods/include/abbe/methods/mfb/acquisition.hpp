@@ -13,7 +13,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/mfb/touch_guide.hpp"
+#include "abbe/calib/mfb/live/touch_guide.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/touch_intake.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
@@ -22,16 +22,16 @@
 
 namespace abbe::daemon {
 
-/// Request for a calibration with a bar. The files are contained as text, so that a replay reads the
-/// same.
+/// Request for a calibration with a bar. The files are contained as text, so that a replay reads
+/// the same.
 struct MfbRequest {
   struct File {
     std::string name;
     std::string text;
   };
   File bar, plan;  ///< bar.toml, plan.toml
-  /// Readings of the touches that earlier sessions took, in their order; the session continues after
-  /// the last one.
+  /// Readings of the touches that earlier sessions took, in their order; the session continues
+  /// after the last one.
   std::vector<calib::Vector3> earlier_m;
 };
 
@@ -82,8 +82,8 @@ class MfbAcquisition {
   /// Readings of all touches taken so far, in their order.
   [[nodiscard]] std::vector<calib::Vector3> readings_m() const;
   /// With a sensor on the bar, the plan of the run has the mean temperature of each pass instead of
-  /// the stated one, with its uncertainty. A pass that only earlier sessions touched keeps the stated
-  /// one, and the uncertainty common to all passes is then the larger of both.
+  /// the stated one, with its uncertainty. A pass that only earlier sessions touched keeps the
+  /// stated one, and the uncertainty common to all passes is then the larger of both.
   [[nodiscard]] MfbRun release();
 
  private:

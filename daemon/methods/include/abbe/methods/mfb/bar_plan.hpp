@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/mfb/plan.hpp"
-#include "abbe/calib/mfb/plan_indexing.hpp"
+#include "abbe/calib/mfb/plan/plan.hpp"
+#include "abbe/calib/mfb/plan/plan_indexing.hpp"
 
 namespace abbe::daemon {
 

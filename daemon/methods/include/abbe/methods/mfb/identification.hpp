@@ -6,10 +6,10 @@
 #include <span>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/gate.hpp"
-#include "abbe/calib/mfb/identify.hpp"
-#include "abbe/calib/mfb/judge.hpp"
-#include "abbe/calib/mfb/monte_carlo.hpp"
+#include "abbe/calib/mfb/identify/monte_carlo.hpp"
+#include "abbe/calib/mfb/judge/judge.hpp"
+#include "abbe/calib/mfb/solve/identify.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/config/config.hpp"
 
 namespace abbe::daemon {

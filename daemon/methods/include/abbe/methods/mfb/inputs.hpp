@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/mfb/measurement.hpp"
+#include "abbe/calib/mfb/run/measurement.hpp"
 #include "abbe/config/config.hpp"
 
 namespace abbe::daemon {

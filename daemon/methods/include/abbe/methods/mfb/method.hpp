@@ -29,12 +29,12 @@ struct MfbMethod {
   [[nodiscard]] static Options options(const Config& config);
   /// {"bar": {"file", "text"}, "plan": {"file", "text"}, "earlier_m": [[x, y, z] ..]}
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
-  /// "earlier_m" may be missing. Throws nlohmann::json::exception for a member that is missing or of
-  /// the wrong type.
+  /// "earlier_m" may be missing. Throws nlohmann::json::exception for a member that is missing or
+  /// of the wrong type.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
   /// Refused: no source of touches, a machine that corrects its positions, too few nodes. BadInput:
-  /// bar, plan or earlier touches are not valid, or the plan does not show all errors; the text names
-  /// file and line or the errors.
+  /// bar, plan or earlier touches are not valid, or the plan does not show all errors; the text
+  /// names file and line or the errors.
   [[nodiscard]] static Result<void> check(const Request& request, const Config& config);
   [[nodiscard]] static Result<Acquisition> acquire(Request&& request, const Options& options);
   [[nodiscard]] static Run run_of(Acquisition&& acquisition);

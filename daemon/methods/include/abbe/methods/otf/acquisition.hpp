@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "abbe/base/axis_position.hpp"
-#include "abbe/calib/otf/path_index.hpp"
-#include "abbe/calib/otf/run.hpp"
+#include "abbe/calib/otf/run/path_index.hpp"
+#include "abbe/calib/otf/run/run.hpp"
 #include "abbe/methods/temperature_range.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
 #include "abbe/pipeline/environment_use.hpp"

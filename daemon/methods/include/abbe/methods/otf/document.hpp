@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/otf/solve.hpp"
+#include "abbe/calib/otf/solve/solve.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/model/model_document.hpp"

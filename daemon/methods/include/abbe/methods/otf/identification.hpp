@@ -12,9 +12,9 @@
 
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
-#include "abbe/calib/gate.hpp"
-#include "abbe/calib/otf/identify.hpp"
-#include "abbe/calib/otf/placed_residuals.hpp"
+#include "abbe/calib/model/gate.hpp"
+#include "abbe/calib/otf/identify/identify.hpp"
+#include "abbe/calib/otf/judge/placed_residuals.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/identification_watch.hpp"
 #include "abbe/methods/otf/acquisition.hpp"

@@ -7,9 +7,9 @@
 
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
-#include "abbe/calib/gate.hpp"
-#include "abbe/calib/otf/run.hpp"
-#include "abbe/config/calibration_machine.hpp"
+#include "abbe/calib/model/gate.hpp"
+#include "abbe/calib/otf/run/run.hpp"
+#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/otf/acquisition.hpp"
 
@@ -24,7 +24,7 @@ namespace abbe::daemon {
 [[nodiscard]] Result<void> check_otf_path(
     std::span<const AxisPosition> path_m, const MachineConfig& machine,
     calib::otf::Mode mode = calib::otf::Mode::OnTheFly,
-    calib::estimation::TravelDependence backlash = calib::estimation::TravelDependence::None);
+    calib::TravelDependence backlash = calib::TravelDependence::None);
 /// Converts the points. Times are those of the tracker's clock, relative to the first point.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(
     std::span<const RunPoint> points);

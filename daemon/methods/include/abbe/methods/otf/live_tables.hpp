@@ -1,6 +1,6 @@
 #pragma once
-/// Tables of an on-the-fly run while the machine moves (calib/otf/running_estimate.hpp). The run's
-/// points are read where the acquisition keeps them, so that a better pose of the tracker can
+/// Tables of an on-the-fly run while the machine moves (calib/otf/live/running_estimate.hpp). The
+/// run's points are read where the acquisition keeps them, so that a better pose of the tracker can
 /// accumulate them again. Nothing here influences points, model or hash of the run. Not for the RT
 /// path and not for the hub: tables() takes up to a second. Used by one thread at a time.
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/otf/running_estimate.hpp"
+#include "abbe/calib/otf/live/running_estimate.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/otf/acquisition.hpp"
 #include "abbe/pipeline/session_status.hpp"

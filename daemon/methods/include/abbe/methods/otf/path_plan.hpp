@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "abbe/calib/otf/plan_prediction.hpp"
+#include "abbe/calib/otf/plan/plan_prediction.hpp"
 
 namespace abbe::daemon {
 

@@ -1,0 +1,44 @@
+#pragma once
+/// The observations of a ball array as blocks over any form of model (estimation/block.hpp), one
+/// block per position of the array. The pose of the array at each position is a nuisance of its
+/// block without prior; errors of the array are unknowns that all blocks share (artefact_rows.hpp).
+/// At position p, a_i: calibrated centre of ball i, r_i: its reading, T_p: pose of the array,
+///     T_p a_i = r_i + D_i(V)
+/// D_i(V): displacement of the fitted centre by V at the touched points (observe.hpp), or V(r_i)
+/// if only errors were given. With an approximate pose T the observation is
+///     y_i = T a_i - r_i = D_i(V) + t_p + theta_p x (r_i - r_1) + (errors of the array) + noise
+/// T fits the array to the readings. For the small rotation theta_p that T lacks, terms of second
+/// order are left out: theta^2 / 2 times the size of the array, 10 nm for errors of 0.1 mm. With
+/// `V_at_m` T is fitted to the corrected readings, and these terms vanish (Gauss-Newton).
+///
+/// The blocks of the array (its two faces) give the approximate pose only: they are touched with
+/// the same errors V, and the poses are free. So a rotation of V common to all positions is not
+/// determined here, and neither is any rigid motion of V.
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "abbe/calib/estimation/block.hpp"
+#include "abbe/calib/evemu/observe/observe.hpp"
+#include "abbe/calib/internal/evemu/solve/volumetric_design.hpp"
+
+namespace abbe::calib::evemu {
+
+struct PoseBlockOptions {
+  /// Standard deviation of a ball centre per coordinate, must be positive. Slow noise is that of
+  /// Observations::slow_noise.
+  double s_m = 1e-6;
+  /// An estimate of V at a reading; empty: 0.
+  std::function<Vector3(const Vector3& reading_m)> V_at_m{};
+};
+
+/// Blocks in the order of the positions; Block::group is the index of the position. Unknowns: those
+/// of the design, then one error of the array per column of artefact_rows(), each with standard
+/// deviation 1 (the caller adds their prior). Errors: BadInput for an s that is not positive;
+/// those of fit_rigid().
+[[nodiscard]] Result<std::vector<estimation::Block>> pose_blocks(const Observations&,
+                                                                 const VolumetricDesign&,
+                                                                 const PoseBlockOptions&);
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,27 @@
+#pragma once
+/// The design matrix of any form of model at a reading, dense, for one stylus. Rows of a ball array
+/// need V at touched points only, so they have the same form for polynomials, for tables, and for
+/// both with other unknowns beside them.
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+
+#include "abbe/calib/geometry/scaled_design.hpp"
+#include "abbe/calib/internal/geometry/model_basis.hpp"
+
+namespace abbe::calib::evemu {
+
+/// V(r) = B(r) U at the reading r.
+struct VolumetricDesign {
+  VolumetricDesign(std::size_t columns, std::function<Eigen::Matrix3Xd(const Vector3&)> of_reading);
+  /// The polynomials of a ball array. They are valid for the tool offset they were made with.
+  VolumetricDesign(const ScaledDesign&);  // NOLINT(google-explicit-constructor): it is a design
+
+  std::size_t unknowns = 0;  ///< columns of B
+  std::function<Eigen::Matrix3Xd(const Vector3& reading_m)> B;
+};
+/// The design of a basis, for the tool offset of the stylus.
+[[nodiscard]] VolumetricDesign design_of(const ModelBasis&, const Vector3& tool_offset_m);
+
+}  // namespace abbe::calib::evemu

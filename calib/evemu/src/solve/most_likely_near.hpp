@@ -1,0 +1,18 @@
+#pragma once
+/// Hyper-parameters of the largest marginal likelihood with columns added to the design, searched
+/// from a starting point near the solution.
+
+#include <Eigen/Core>
+#include <span>
+
+#include "abbe/calib/evemu/solve/prior.hpp"
+
+namespace abbe::calib::evemu {
+
+/// As most_likely() for bayes-pose, from one starting point.
+[[nodiscard]] Result<HyperParameters> most_likely_near(const HyperParameters& start,
+                                                       const ScaledDesign&, std::size_t positions,
+                                                       const LinearGaussian& problem,
+                                                       std::span<const double> added);
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,14 @@
+#pragma once
+/// The norm that compares models of a ball array with each other and with their uncertainty.
+
+#include "abbe/calib/evemu/observe/observe.hpp"
+#include "abbe/calib/geometry/scaled_design.hpp"
+#include "abbe/calib/internal/geometry/rigid_free_norm.hpp"
+
+namespace abbe::calib::evemu {
+
+/// Root mean square of V over the readings of all balls at all positions, without rigid motion, for
+/// a V given by coefficients of the design.
+[[nodiscard]] RigidFreeNorm norm_over_balls(const Observations&, const ScaledDesign&);
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,71 @@
+#pragma once
+/// The 18 position-dependent errors of three linear axes as polynomials, and their effect on the
+/// functional point. [Li OMM] eq. (3): every error function is
+///     sum_k K_k q^k,    k = 0 .. order,   q: reading of the axis, K_k: coefficients.
+/// With the 3 squareness errors the volumetric error is E = A(x, y, z) K. The axes are a1, a2, a3
+/// from the workpiece to the tool. The error of an axis acts after the axis's own motion. To first
+/// order
+///     E = sum_i ( d_i(q_i) + e_i(q_i) x r_i ) + squareness,
+///     d_i, e_i: translation and rotation error of axis i,
+///     r_i = travels of the axes nearer to the tool + tool offset,
+/// with one squareness rotation about the direction of a3 before the travel of a2, and two, about
+/// the directions of a1 and a2, before the travel of a3. E = true - reading, evaluated at the
+/// reading. Lengths in mm: the units of the coefficients are mm^(1-k) and rad mm^-k.
+
+#include <Eigen/Core>
+#include <array>
+#include <compare>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/geometry/kinematic_chain.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
+
+namespace abbe::calib {
+
+inline constexpr int kLeastOrder = 1;
+inline constexpr int kMostOrder = 5;
+
+/// x^i y^j z^k.
+struct Monomial {
+  std::array<int, 3> exponent{};
+  [[nodiscard]] double at(const Vector3& p_mm) const;
+  // A defaulted <=> compares with a literal 0, which clang-tidy 14 wrongly reports as a null
+  // pointer.
+  friend auto operator<=>(const Monomial&,
+                          const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
+};
+
+/// A(row, coefficient) contains factor * monomial. Row 3 t + c: component c with tool t.
+struct PolynomialTerm {
+  std::size_t row = 0;
+  std::size_t coefficient = 0;
+  Monomial monomial;
+  double factor = 1.0;
+};
+
+/// Immutable value: A in symbolic form.
+class ErrorPolynomials {
+ public:
+  /// BadInput unless kLeastOrder <= order <= kMostOrder and there is at least one tool offset.
+  [[nodiscard]] static Result<ErrorPolynomials> of(const KinematicChain&, int order,
+                                                   std::span<const Vector3> tool_offsets_mm);
+  [[nodiscard]] static Result<ErrorPolynomials> of(const KinematicChain&, int order);
+
+  /// Names of K: for axis x, y, z, for d (translation) then e (rotation), for direction x, y, z,
+  /// order high to low: `k_exz2` = rotation about x, caused by the motion of z, coefficient of z^2.
+  /// Then squareness: `S_zx`.
+  [[nodiscard]] std::span<const std::string> names() const { return names_; }
+  [[nodiscard]] std::span<const PolynomialTerm> terms() const { return terms_; }
+  [[nodiscard]] std::size_t rows() const { return rows_; }  ///< 3 per tool
+  /// rows() x names().size()
+  [[nodiscard]] Eigen::MatrixXd A(const Vector3& p_mm) const;
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<PolynomialTerm> terms_;
+  std::size_t rows_ = 0;
+};
+
+}  // namespace abbe::calib

@@ -1,0 +1,23 @@
+#pragma once
+/// Fields V that are constant in space, in terms of the scaled design (scaled_design.hpp).
+
+#include <Eigen/Core>
+
+#include "abbe/calib/geometry/scaled_design.hpp"
+
+namespace abbe::calib {
+
+/// design.size() x 3: maps a vector v [m] to the coefficients c of the field V(q) = v.
+inline Eigen::MatrixX3d constant_fields(const ScaledDesign& design) {
+  Eigen::MatrixX3d C = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(design.size()), 3);
+  for (std::size_t j = 0; j < design.size(); ++j) {
+    const DesignFunction& f = design.functions()[j];
+    if (f.kind == FunctionKind::Constant) {
+      C(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(f.part[0].component)) =
+          1.0 / f.part[0].sign;
+    }
+  }
+  return C;
+}
+
+}  // namespace abbe::calib

@@ -1,0 +1,148 @@
+#include "abbe/calib/geometry/axis_mistakes.hpp"
+
+#include <algorithm>
+
+#include "abbe/calib/internal/base/message.hpp"
+
+namespace abbe::calib {
+namespace {
+
+Matrix3 reversed(std::span<const Eigen::Index> axes) {
+  Matrix3 M = Matrix3::Identity();
+  for (const Eigen::Index a : axes) {
+    M(a, a) = -1.0;
+  }
+  return M;
+}
+
+/// Matrix whose product with a point has the point's coordinate from[i] as coordinate i.
+Matrix3 reordered(const std::array<Eigen::Index, 3>& from) {
+  Matrix3 M = Matrix3::Zero();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    M(i, from[static_cast<std::size_t>(i)]) = 1.0;
+  }
+  return M;
+}
+
+bool is_inside(double q_m, const AxisNodes& axis, double tolerance_m) {
+  return q_m >= axis.nodes_m.front() - tolerance_m && q_m <= axis.nodes_m.back() + tolerance_m;
+}
+
+bool all_inside(std::span<const Vector3> points_m, const Matrix3& M, const MachineNodes& travel) {
+  return std::all_of(points_m.begin(), points_m.end(), [&](const Vector3& p) {
+    const Vector3 q = M * p;
+    return outside_travel(std::span(&q, 1), travel).empty();
+  });
+}
+
+double travel_m(const AxisNodes& axis) {
+  return axis.nodes_m.back() - axis.nodes_m.front();
+}
+
+/// A wrong sign, order or unit moves coordinates by a large part of the travel. A coordinate a
+/// little beyond an end is a coordinate a little beyond an end.
+bool is_far_outside(std::span<const Vector3> points_m, const MachineNodes& travel) {
+  constexpr double kFar = 0.05;
+  double shortest_m = travel_m(travel[0]);
+  for (const AxisNodes& axis : travel) {
+    shortest_m = std::min(shortest_m, travel_m(axis));
+  }
+  return !outside_travel(points_m, travel, kFar * shortest_m).empty();
+}
+
+/// True if the scaled points extend over at least half of the travel of an axis. A factor below 1
+/// makes all coordinates small, and small coordinates are inside the travel of most machines.
+bool fills(std::span<const Vector3> points_m, double factor, const MachineNodes& travel) {
+  constexpr double kPart = 0.5;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto [low, high] = std::minmax_element(
+        points_m.begin(), points_m.end(), [a](const Vector3& p, const Vector3& q) {
+          return p(static_cast<Eigen::Index>(a)) < q(static_cast<Eigen::Index>(a));
+        });
+    const auto k = static_cast<Eigen::Index>(a);
+    if (factor * ((*high)(k) - (*low)(k)) >= kPart * travel_m(travel[a])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Units of the points that may be wrong, and those of the travel.
+std::vector<UnitMistake> units_of_points_or_travel() {
+  std::vector<UnitMistake> all = unit_mistakes();
+  all.push_back({"the travel of the axes in inches instead of mm", 1.0 / 25.4});
+  all.push_back({"the travel of the axes in m instead of mm", 1e-3});
+  return all;
+}
+
+}  // namespace
+
+const std::vector<AxisMistake>& axis_mistakes() {
+  static const std::vector<AxisMistake> all{
+      {"X reversed", reversed(std::array<Eigen::Index, 1>{0})},
+      {"Y reversed", reversed(std::array<Eigen::Index, 1>{1})},
+      {"Z reversed", reversed(std::array<Eigen::Index, 1>{2})},
+      {"X and Y swapped", reordered({1, 0, 2})},
+      {"X and Z swapped", reordered({2, 1, 0})},
+      {"Y and Z swapped", reordered({0, 2, 1})},
+      {"X and Y reversed", reversed(std::array<Eigen::Index, 2>{0, 1})},
+      {"X and Z reversed", reversed(std::array<Eigen::Index, 2>{0, 2})},
+      {"Y and Z reversed", reversed(std::array<Eigen::Index, 2>{1, 2})},
+      {"the axes in the order Y, Z, X", reordered({2, 0, 1})},
+      {"the axes in the order Z, X, Y", reordered({1, 2, 0})}};
+
+  return all;
+}
+
+const std::vector<UnitMistake>& unit_mistakes() {
+  static const std::vector<UnitMistake> all{{"lengths in m instead of mm", 1e3},
+                                            {"lengths in um instead of mm", 1e-3},
+                                            {"lengths in inches instead of mm", 25.4}};
+  return all;
+}
+
+std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m,
+                                          const MachineNodes& travel, double tolerance_m) {
+  std::vector<OutsideTravel> found;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (!is_inside(points_m[i][static_cast<Eigen::Index>(a)], travel[a], tolerance_m)) {
+        found.push_back({i, a});
+      }
+    }
+  }
+  return found;
+}
+
+std::string corrections_inside_travel(std::span<const Vector3> points_m,
+                                      const MachineNodes& travel) {
+  if (!is_far_outside(points_m, travel)) {
+    return "";
+  }
+  std::vector<std::string> texts;
+  for (const AxisMistake& mistake : axis_mistakes()) {
+    if (all_inside(points_m, mistake.M, travel)) {
+      texts.push_back(mistake.text);
+    }
+  }
+
+  const bool explained = !texts.empty();
+  for (const UnitMistake& mistake : units_of_points_or_travel()) {
+    if (!explained && all_inside(points_m, mistake.factor * Matrix3::Identity(), travel) &&
+        fills(points_m, mistake.factor, travel)) {
+      texts.push_back(mistake.text);
+    }
+  }
+
+  return texts.empty() ? "" : "; all are inside with " + or_list(texts);
+}
+
+std::string or_list(std::span<const std::string> texts) {
+  std::string out;
+  for (const std::string& text : texts) {
+    out += message(out.empty() ? "" : ", or with ", text);
+  }
+  return out;
+}
+
+}  // namespace abbe::calib

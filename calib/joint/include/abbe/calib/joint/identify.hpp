@@ -1,0 +1,153 @@
+#pragma once
+/// Joint identification: one model from several parts (part.hpp) that were tested against each
+/// other before. With R_k, z_k of the parts, all parts together minimise
+///     sum_k |R_k x - z_k|^2 + |effects|^2,    x = (e, effects),   U = N e in gauge G2
+/// The information is a sum, so the covariance of the result is never larger than that of a part
+/// alone (as matrices), and neither is the uncertainty of V at any position.
+///
+/// Test of two parts i, j: how much larger is the minimum of both together than the sum of their
+/// own minima?
+///     X2 = min(i + j + priors of shared effects) - min(i) - min(j)
+/// X2 is chi-square with rank(i) + rank(j) + (shared effects) - rank(i + j) degrees of freedom if
+/// both describe one machine. It is the chi-square of the difference over all combinations of
+/// parameters that both determine; combinations that one part alone determines do not contribute.
+/// An estimated noise (Part::dof_of_noise) may be too small: X2 is divided by the factor by which
+/// its variance exceeds the estimate with a probability of 2 %,
+///     1 / (1 - s - 2.054 sqrt(s))^3,   s = 2 / (9 dof)    [Wilson 1931], at most 1000
+/// The covariance of the joint model is not widened for a noise that is known only to some percent.
+///
+/// Directed tests. X2 has many degrees of freedom, so that a difference of one kind adds little to
+/// it. A difference of the most frequent kinds is therefore tested by itself: one factor of all
+/// lengths (temperature, calibration, ranges of the tracker), the scale of X, Y, Z, and the three
+/// squareness errors. Part k observes e + a d, all other parts e (a: effect of the direction); d is
+/// estimated in the adjustment of all parts, with its standard uncertainty u and the degrees of
+/// freedom of u, and |d| / u is compared with the quantile of Student's t. Of two parts there is
+/// one such test for each direction, of n > 2 parts n: each part against all others, which also
+/// shows which part differs.
+///
+/// False alarms: the limits of all tests sum to JointOptions::false_alarm (Bonferroni): 70 % for
+/// the directed tests of the length, the most frequent mistake, 20 % for those of scales and
+/// squareness, a tenth for X2 of the pairs. With the default a length error of 5 u between two
+/// parts is found with a probability of 0.96.
+///
+/// Explanations of a contradiction: all that leave an X2 whose probability is larger than 1e-3 and
+/// than the limit of the test. First the one that fits best: that whose improvement of X2 is least
+/// likely to occur by chance (Explanation::log_p).
+/// - mistakes without unknowns, at most three: the sign of a whole part or of one table, the unit
+///   of a part, the mistakes of its method (axes reversed or swapped, tool);
+/// - a difference in one direction, the one that fits best;
+/// - tables that differ, at most three: each is the table that decreases X2 most significantly with
+///   those before it free, until the rest is likely.
+/// Two parts alone do not show which of them is wrong.
+///
+/// All functions are pure and may be called from any thread; Part::mistakes is called on the thread
+/// of the caller. The text of an error starts with "joint identification: ".
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/joint/part.hpp"
+#include "abbe/calib/model/model_drift.hpp"
+
+namespace abbe::calib::joint {
+
+struct JointOptions {
+  /// Probability that parts of one machine are refused. All tests together have at most this
+  /// probability (Bonferroni). 2e-3: 100 sound sets of parts without a refusal with a probability
+  /// of 0.82 or more.
+  double false_alarm = 2e-3;
+};
+
+/// A table or squareness error in which two parts differ.
+struct TableDifference {
+  std::string table;  ///< "EXX", "EC0Y"
+  /// j minus i where it is largest, m or rad, with its standard uncertainty; the other tables
+  /// alike.
+  double difference = 0.0, u = 0.0;
+  std::optional<double> position_m{};  ///< on the axis; nullopt: squareness
+  bool is_angle = false;
+  ChiSquare test;  ///< by how much X2 decreases if this table may differ
+};
+/// "EXX by 4.2 um at 300 mm (u 0.5 um)"
+[[nodiscard]] std::string text(const TableDifference&);
+
+/// What makes two parts agree that contradict each other.
+struct Explanation {
+  std::string text;
+  /// How likely the improvement occurs by chance: log of the tail of chi-square, with as many
+  /// degrees of freedom as unknowns; a mistake without unknowns counts as one.
+  double log_p = 0.0;
+};
+
+struct PairTest {
+  std::size_t i = 0, j = 0;  ///< indices of the parts
+  ChiSquare all;             ///< statistic, degrees of freedom, p, limit
+  bool contradiction = false;
+  /// Of a contradiction: mistakes, directions, tables, best first; else empty.
+  std::vector<Explanation> explanations{};
+  std::vector<TableDifference> tables{};  ///< of a contradiction: the most significant, at most 3
+};
+
+inline constexpr const char* kLength = "length";  ///< DirectedTest::direction
+
+/// Does one part differ from all others in one direction?
+struct DirectedTest {
+  std::size_t part = 0;   ///< index of the part
+  std::string direction;  ///< kLength, "scale of X", "EC0Y"
+  bool is_angle = false;  ///< rad, else relative
+  /// Part minus all others, with its standard uncertainty.
+  double difference = 0.0, u = 0.0;
+  double dof = 0.0;  ///< of u; 0: all uncertainties were stated
+  double p = 1.0, limit = 0.0;
+  bool contradiction = false;
+  bool explains = false;  ///< all parts agree if this part may differ in this direction
+};
+/// "array: its lengths are larger by 20.3 um/m (u 1.7 um/m, p 1e-12) than those of run: wrong
+/// length or temperature of the array, or wrong scale of the tracker's ranges"
+[[nodiscard]] std::string text(const DirectedTest&, std::span<const Part>);
+
+/// Tests all pairs. BadInput for fewer than two parts, names that repeat, parts with another
+/// number of parameters, a false-alarm probability that is not between 0 and 1, or an effect that
+/// two parts state with different uncertainties.
+[[nodiscard]] Result<std::vector<PairTest>> test_pairs(std::span<const Part>, const CommonTables&,
+                                                       const JointOptions& = {});
+
+/// Tests all directions that the parts determine. Errors as test_pairs().
+[[nodiscard]] Result<std::vector<DirectedTest>> test_directions(std::span<const Part>,
+                                                                const CommonTables&,
+                                                                const JointOptions& = {});
+
+struct EffectEstimate {
+  std::string name;
+  double value = 0.0, u = 0.0;  ///< in units of its stated standard uncertainty
+};
+
+struct JointModel {
+  VolumetricModel model;  ///< gauge G2, for the tool of the common tables
+  std::vector<EffectEstimate> effects;
+  std::size_t rank = 0;
+  double condition = 0.0;
+};
+/// The model of all parts, tested or not: the caller tests them before. RankDeficient if all parts
+/// together leave a combination undetermined; the text names parameters. BadInput as test_pairs(),
+/// for no part at all, and if the covered positions of all parts span no volume.
+[[nodiscard]] Result<JointModel> joint_model(std::span<const Part>, const CommonTables&);
+
+struct JointIdentification {
+  std::vector<PairTest> pairs;
+  std::vector<DirectedTest> directed;
+  /// nullopt if a test found a contradiction: parts are never averaged then.
+  std::optional<JointModel> joint;
+  /// First the most significant directed test, if it explains all and fits better than any other
+  /// explanation; then each pair: "run 1 and array contradict each other: chi-square ..."; then the
+  /// most significant directed test, if it is not the first.
+  std::vector<std::string> contradictions;
+};
+/// Tests all pairs and directions, and computes the model if there is no contradiction. A
+/// contradiction is a result, not an error. Errors as test_pairs() and joint_model().
+[[nodiscard]] Result<JointIdentification> identify(std::span<const Part>, const CommonTables&,
+                                                   const JointOptions& = {});
+
+}  // namespace abbe::calib::joint

@@ -1,0 +1,40 @@
+#pragma once
+/// Calibration of a Multi-Feature Bar by reversal on a measuring machine [Viprey 2016, eq. 5 to 7]:
+/// the bar is measured as it lies (normal) and turned by 180 degrees about its axis (reversed),
+/// which changes the sign of its straightness errors but not that of the machine:
+///     E_y = (M_y normal - M_y reversed) / 2,   E_y of the machine = -(M_y normal + M_y reversed) / 2
+/// and the same in z. Positioning is not separable by reversal:
+///     E_x = (M_x normal + M_x reversed) / 2 + E_XX of the machine
+/// E_XX is measured on the line of the bar, with a step gauge. The sag of the bar cancels: the
+/// result is the shape of the weightless bar.
+
+#include <vector>
+
+#include "abbe/calib/geometry/rigid_transform.hpp"
+
+namespace abbe::calib::mfb {
+
+/// Deviations M of the points of interest of one pass, one per hole, in the axes of the machine,
+/// after end-point levelling; x without the nominal position, y without the nominal shift of the
+/// hole, which has the opposite sign in a reversed pass. m.
+using BarPass = std::vector<Vector3>;
+
+struct ReversalRuns {
+  std::vector<BarPass> normal, reversed;  ///< the same number of repeats of each
+  std::vector<double> machine_x_m;        ///< E_XX of the machine at each hole, on the bar's line
+  std::vector<double> u_machine_x_m;  ///< its standard uncertainty; empty: not known, counts as 0
+};
+
+struct CalibratedBar {
+  std::vector<Vector3> error_m;        ///< E_x, E_y, E_z of each hole
+  std::vector<Vector3> u_m;            ///< standard uncertainty; x: of the mean and of E_XX
+  std::vector<Vector3> u_mean_m;       ///< of the mean of the repeats alone (type A)
+  std::size_t degrees_of_freedom = 0;  ///< of u_mean_m: for the coverage factor of Student's t
+  std::vector<Vector3> machine_m;      ///< errors of the machine along the bar; x: E_XX
+};
+
+/// TooFewObservations below 2 repeats; BadInput below 2 holes, if the numbers of repeats or holes
+/// differ, or an uncertainty is negative; NotFinite. The text names pass and hole, counted from 1.
+[[nodiscard]] Result<CalibratedBar> calibrate_by_reversal(const ReversalRuns&);
+
+}  // namespace abbe::calib::mfb

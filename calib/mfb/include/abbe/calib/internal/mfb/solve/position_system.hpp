@@ -1,0 +1,49 @@
+#pragma once
+/// The whitened rows of one position [A | L | y] and their elimination: with the priors of the
+/// nuisances c as further rows, an orthogonal Q gives
+///     Q^T [A L y] = [G R z]      c = R^-1 (z - G x), x: shared unknowns
+///                   [E 0 e]      what the position states about x
+
+#include <Eigen/Cholesky>
+#include <vector>
+
+#include "abbe/calib/estimation/information.hpp"
+#include "abbe/calib/internal/mfb/solve/pass_rows.hpp"
+
+namespace abbe::calib::mfb {
+
+/// Root L of the covariance C_O = L L^T of the points of a pass. DegenerateGeometry if the touches
+/// do not determine all points.
+using RootOfNoise = Eigen::LLT<Eigen::MatrixXd>;
+[[nodiscard]] Result<RootOfNoise> root_of_noise(const TouchNoise&, const PassObservation&);
+
+struct PositionSystem {
+  std::vector<std::size_t> passes;  ///< in Observations::passes; their rows follow each other
+  std::vector<RootOfNoise> root;    ///< of each pass
+  NuisanceLayout layout;
+  Eigen::Index rows_of_pass = 0;
+  RowMajorRows A;     ///< whitened, data only
+  Eigen::MatrixXd L;  ///< whitened, data only
+  Eigen::VectorXd y;  ///< whitened
+  Eigen::MatrixXd R;  ///< upper triangle
+  Eigen::MatrixXd G;
+  Eigen::VectorXd z;
+  Eigen::MatrixXd E;
+  Eigen::VectorXd e;
+
+  /// The nuisances for given shared unknowns.
+  [[nodiscard]] Eigen::VectorXd nuisances(const Eigen::VectorXd& x) const;
+};
+
+/// RankDeficient if the rows do not determine the nuisances.
+[[nodiscard]] Result<PositionSystem> position_system(const Observations&, std::size_t position,
+                                                     const SharedUnknowns&, const NuisanceOptions&);
+
+/// E^T Q_E^T W as a matrix of the data: shared unknowns x data rows, W: whitening. With the
+/// covariance C of the shared unknowns, C times it is the derivative of x by delta.
+[[nodiscard]] Eigen::MatrixXd gain_rows(const PositionSystem&);
+
+/// The priors of the shared unknowns.
+void add_shared_priors(estimation::Information&, const SharedUnknowns&);
+
+}  // namespace abbe::calib::mfb

@@ -1,0 +1,78 @@
+#pragma once
+/// Places of a bar at which all readings stay within the travel.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/mfb/plan/plan_positions.hpp"
+
+namespace abbe::calib::mfb {
+
+/// Which stylus enters the holes along an axis. bar_z points against the stem of the first one.
+struct StyliAlong {
+  std::optional<std::size_t> against;  ///< stem along the negative axis
+  std::optional<std::size_t> along;    ///< stem along the positive axis
+};
+/// Of several styli with the same stem the longest.
+[[nodiscard]] StyliAlong styli_along(const PlanTask&, std::size_t axis);
+
+/// Direction of the bar in the plane of two axes.
+struct BarDirection {
+  Vector3 x = Vector3::UnitX();
+  double angle_rad = 0.0;  ///< from the first axis
+};
+
+/// Bar axes from bar_x and bar_z.
+[[nodiscard]] Matrix3 bar_axes(const Vector3& x, const Vector3& z);
+
+class BarPlacer {
+ public:
+  explicit BarPlacer(const PlanTask&);
+
+  /// From the first to the last hole.
+  [[nodiscard]] double length_m() const { return length_m_; }
+  [[nodiscard]] double travel_m(std::size_t axis) const { return hi_m(axis) - lo_m(axis); }
+  [[nodiscard]] double lo_m(std::size_t axis) const;
+  [[nodiscard]] double hi_m(std::size_t axis) const;
+  /// Touches may be outside the nodes by the radius of a hole (a bar as long as the travel has its
+  /// outer holes at the ends), but not by more than half a cell, where files end.
+  [[nodiscard]] double overhang_m(std::size_t axis) const;
+
+  /// For the bar at the origin.
+  [[nodiscard]] ReadingRange readings(const Matrix3& axes,
+                                      std::span<const std::size_t> styli) const;
+  /// Places of O_1 between which all readings are possible, with all holes in the volume that a
+  /// stylus along the ram reaches (a stylus across it reaches places beside the table); min > max:
+  /// none.
+  struct Room {
+    Vector3 min_m, max_m;
+    [[nodiscard]] bool exists() const { return (max_m - min_m).minCoeff() >= 0.0; }
+  };
+  [[nodiscard]] Room room(const Matrix3& axes, std::span<const std::size_t> styli) const;
+  /// The place of O_1 next to `wanted_m`; nullopt: the bar does not fit.
+  [[nodiscard]] std::optional<Vector3> nearest(const Matrix3& axes,
+                                               std::span<const std::size_t> styli,
+                                               const Vector3& wanted_m) const;
+
+  /// Along `axis`, or inclined towards `other` as little as the travel requires, for holes along
+  /// the third axis. sign: of the component along `other`. nullopt: the bar does not fit in the
+  /// plane.
+  [[nodiscard]] std::optional<BarDirection> along(std::size_t axis, std::size_t other, double sign,
+                                                  const Vector3& z,
+                                                  std::span<const std::size_t> styli) const;
+  /// As near to 45 degrees as the travel permits; sign: of the component along `second`.
+  [[nodiscard]] std::optional<BarDirection> diagonal(std::size_t first, std::size_t second,
+                                                     double sign, const Vector3& z,
+                                                     std::span<const std::size_t> styli) const;
+  /// Readings of O_1 for bars along an axis: the first at its lower end, the last at its upper end.
+  [[nodiscard]] std::vector<double> starts_m(std::size_t axis) const;
+
+ private:
+  const PlanTask* task_;
+  std::vector<NominalTouch> touches_;
+  double length_m_ = 0.0;
+  Vector3 ram_offset_m_;
+};
+
+}  // namespace abbe::calib::mfb

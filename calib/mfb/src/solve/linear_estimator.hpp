@@ -1,0 +1,14 @@
+#pragma once
+/// The estimate of the parameters as a linear function of the deviations: U = sum H_pass
+/// delta_pass.
+
+#include "abbe/calib/mfb/solve/solve.hpp"
+
+namespace abbe::calib::mfb {
+
+struct LinearEstimator {
+  std::vector<Eigen::MatrixXd> of_pass;  ///< parameters x 3N, by pass
+};
+[[nodiscard]] Result<LinearEstimator> linear_estimator(const Observations&, const SolveOptions&);
+
+}  // namespace abbe::calib::mfb

@@ -1,0 +1,221 @@
+#pragma once
+/// The result of every identification method: the volumetric error V of a machine and its
+/// uncertainty. V is the error of the functional point (stylus tip or reflector)
+///     V(q, t) = actual - nominal = true position - reading
+/// in machine coordinates, at the scale reading q, for the tool offset t (tool reference point to
+/// functional point). Use of a model, p: nominal position:
+/// - measuring: corrected = reading + V(reading),
+/// - positioning: command p + c with c = -V(p + c).
+/// A rigid motion of the whole volume is not estimable and not part of a model; neither are errors
+/// outside the validity volume.
+///
+/// The covariance of V contains the misfit of the model (misfit.hpp); that of the parameters
+/// contains its effect on them.
+///
+/// With backlash (travel_differences.hpp) V depends on the direction in which each axis last moved.
+/// Functions without this direction give the mean of both directions; the covariance contains half
+/// the difference, not its uncertainty. error_at() with all directions unknown contains both.
+///
+/// A model has one of two forms: tables with nodes (rigid-body model; linear or cubic between the
+/// nodes, with natural or not-a-knot ends), or polynomials without tables (equivalent model of a
+/// ball array). Gate, grid, comparison and export treat all forms alike: nodes() and
+/// linear_between_nodes() describe them. Values and uncertainties refer to the
+/// gauge of the model; compare two models with rigid_free_difference().
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "abbe/calib/geometry/parameter_layout.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
+#include "abbe/calib/geometry/table_basis.hpp"
+#include "abbe/calib/geometry/travel_differences.hpp"
+#include "abbe/calib/geometry/validity_volume.hpp"
+#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/misfit.hpp"
+#include "abbe/calib/model/polynomial_model.hpp"
+
+namespace abbe::calib {
+
+struct VolumetricError {
+  Vector3 V_m = Vector3::Zero();       ///< NaN if !tool_ok
+  Matrix3 cov_V_m2 = Matrix3::Zero();  ///< k = 1, in the model's gauge; NaN if !tool_ok
+  bool inside = false;                 ///< the axis position is in the validity volume
+  bool tool_ok = false;                ///< the model is valid for this tool offset
+};
+
+/// Checks that a covariance is square, finite, symmetric and, within rounding, positive
+/// semidefinite; else BadInput or NotFinite. Takes n^3 / 3 operations.
+[[nodiscard]] Result<void> check_covariance(const Eigen::MatrixXd&);
+
+struct Correction {
+  Vector3 c_m = Vector3::Zero();  ///< add to the nominal position to obtain the command
+  int evaluations = 0;
+  bool inside = false;
+};
+
+/// Data of a polynomial model in addition to its coefficients.
+struct PolynomialForm {
+  int order = 3;
+  ReadingBox box;
+  Vector3 ball1_m = Vector3::Zero();
+};
+
+/// A model as stored: all data from which from_description() restores it bit for bit.
+struct ModelDescription {
+  KinematicChain chain;
+  MachineNodes nodes;
+  Gauge gauge = Gauge::G1;
+  /// Tool offsets of the measurements.
+  /// - One offset: the model is valid for this tool only.
+  /// - Several offsets on a line (all 18 tables): valid for tools on this line; the rotation about
+  ///   the line is not determined.
+  /// - Three or more offsets that are not on a line (all 18 tables): valid for any tool.
+  std::vector<Vector3> tool_offsets_m;
+  std::vector<Parameter> parameters;  ///< in the order of ParameterLayout, no rigid unknowns
+  Eigen::MatrixXd covariance;  ///< parameters x parameters, full, symmetric, m^2, m rad, rad^2
+  std::vector<Vector3> validity_hull_m;
+  /// If set, `parameters` are the coefficients of the scaled design [m]; nodes and basis are
+  /// ignored.
+  std::optional<PolynomialForm> polynomials{};
+  /// of the tables of all axes, between `nodes`
+  Interpolation interpolation = Interpolation::Linear;
+  /// Tables only. `covariance` contains half the differences (TravelDifferences).
+  std::optional<TravelDifferences> travel{};
+  /// Misfit, in addition to `covariance`, which contains its effect on the parameters.
+  std::optional<Misfit> misfit{};
+};
+
+/// Immutable value; all member functions are const and may be called from any thread.
+class VolumetricModel {
+ public:
+  /// Largest difference between a tool offset and that of the model. The tables of a 14-table model
+  /// include the effect of the tool offset. An offset that differs by 0.5 mm changes V by at most
+  /// 0.05 um at a rotation error of 100 urad, less than the resolution of a run. With a larger
+  /// difference the model is not valid.
+  static constexpr double kToolTolerance_m = 0.5e-3;
+
+  /// BadInput or NotFinite if the parameters are wrong (unknown or repeated name, missing node,
+  /// wrong size); the text names the first wrong parameter.
+  [[nodiscard]] static Result<VolumetricModel> from_description(ModelDescription);
+  /// `U`: the model_size() parameters of the layout; `covariance`: their covariance;
+  /// `interpolation`: of all tables.
+  [[nodiscard]] static Result<VolumetricModel> from_vector(
+      const ParameterLayout&, Gauge, std::span<const Vector3> tool_offsets_m,
+      const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume,
+      Interpolation interpolation = Interpolation::Linear);
+  /// The same with the tables of a basis, and their interpolation.
+  [[nodiscard]] static Result<VolumetricModel> from_vector(const TableBasis&, Gauge,
+                                                           std::span<const Vector3> tool_offsets_m,
+                                                           const Eigen::VectorXd& U,
+                                                           const Eigen::MatrixXd& covariance,
+                                                           ValidityVolume);
+
+  /// A polynomial model, valid for one tool. Gauge Ball1 or Ball1Blocks.
+  [[nodiscard]] static Result<VolumetricModel> from_polynomials(PolynomialModel, Gauge,
+                                                                const Vector3& tool_offset_m,
+                                                                ValidityVolume);
+
+  /// The same model with differences between the directions of travel; `covariance()` must contain
+  /// half of them: half_differences() times its transpose. BadInput for polynomials, wrong sizes,
+  /// or a covariance, with that of the tables, not positive semidefinite; NotFinite for NaN.
+  [[nodiscard]] Result<VolumetricModel> with_travel(TravelDifferences) const;
+  /// The same model with another misfit; no misfit if !Misfit::any(). BadInput for a wrong size or
+  /// a negative value, NotFinite for NaN.
+  [[nodiscard]] Result<VolumetricModel> with_misfit(Misfit) const;
+
+  /// V with its covariance. Takes about 1 us, 4 us for cubic tables. No allocation.
+  [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
+                                         const Vector3& tool_offset_m) const;
+  /// V alone, about four times faster. NaN for a tool for which the model is not valid.
+  [[nodiscard]] Vector3 V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const;
+  /// Solves c = -V(p + c) for the nominal position p, by iteration until c changes by less than
+  /// 1e-9 m. NotApplicable for a tool for which the model is not valid. NotConverged after 50
+  /// evaluations; this occurs only if |dV/dq| is close to 1 (implausible tables).
+  /// `travel`: the direction in which the axes reach the position.
+  [[nodiscard]] Result<Correction> command_correction(const Vector3& nominal_m,
+                                                      const Vector3& tool_offset_m,
+                                                      const AxisTravel& travel = {}) const;
+
+  /// The same for the direction in which each axis last moved. Where it is Unknown, V is the mean
+  /// of both directions, and the covariance contains half the difference and its uncertainty.
+  /// Without differences the direction has no effect. error_at() allocates with differences.
+  [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
+                                         const Vector3& tool_offset_m, const AxisTravel&) const;
+  [[nodiscard]] Vector3 V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m,
+                             const AxisTravel&) const;
+
+  [[nodiscard]] bool holds_for_tool(const Vector3& tool_offset_m) const;
+  [[nodiscard]] const KinematicChain& chain() const;
+  /// Positions at which the model is checked, compared and published. Linear tables: their nodes;
+  /// cubic tables: their nodes and the middles of the cells between them, the nodes alone if there
+  /// would be more than 300,000 positions; polynomials: a grid over the bounding box of the
+  /// validity volume. The nodes of any tables are in tables()->layout().
+  [[nodiscard]] const MachineNodes& nodes() const { return nodes_; }
+  /// V is linear between nodes() along each axis.
+  [[nodiscard]] bool linear_between_nodes() const {
+    return interpolation() == Interpolation::Linear;
+  }
+  /// Of the tables; nullopt for a model of polynomials.
+  [[nodiscard]] std::optional<Interpolation> interpolation() const {
+    return tables() == nullptr ? std::nullopt
+                               : std::optional(tables()->interpolation(Axis::X).kind());
+  }
+  /// Null for a model of polynomials.
+  [[nodiscard]] const TableBasis* tables() const { return std::get_if<TableBasis>(&form_); }
+  [[nodiscard]] const PolynomialModel* polynomials() const {
+    return std::get_if<PolynomialModel>(&form_);
+  }
+  /// Null if V does not depend on the direction of travel.
+  [[nodiscard]] const TravelDifferences* travel() const {
+    return travel_ ? &travel_->differences : nullptr;
+  }
+  /// The tables with their dependence on travel; null without.
+  [[nodiscard]] const TableBasis* travel_tables() const {
+    return travel_ ? &travel_->basis : nullptr;
+  }
+  /// Null without misfit.
+  [[nodiscard]] const Misfit* misfit() const { return misfit_ ? &*misfit_ : nullptr; }
+  /// What the misfit adds to the covariance of V, for a tool for which the model is valid.
+  [[nodiscard]] Matrix3 misfit_cov_V_m2(const Vector3& axis_position_m,
+                                        const Vector3& tool_offset_m) const;
+  [[nodiscard]] Gauge gauge() const { return gauge_; }
+  [[nodiscard]] std::span<const Vector3> tool_offsets_m() const { return tool_offsets_m_; }
+  [[nodiscard]] const ValidityVolume& validity() const { return validity_; }
+  [[nodiscard]] const Eigen::VectorXd& U() const { return U_; }
+  [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
+  [[nodiscard]] std::vector<Parameter> parameters() const;
+  [[nodiscard]] ModelDescription description() const;
+
+ private:
+  using Form = std::variant<TableBasis, PolynomialModel>;
+  VolumetricModel(Form form, MachineNodes nodes)
+      : form_(std::move(form)), nodes_(std::move(nodes)) {}
+  [[nodiscard]] Vector3 lever_offset_m(const Vector3& offset_m) const;
+
+  struct TravelForm {
+    TableBasis basis;
+    TravelDifferences differences;
+    Eigen::VectorXd U_and_D;
+  };
+
+  Form form_;
+  MachineNodes nodes_;
+  Gauge gauge_ = Gauge::G1;
+  std::vector<Vector3> tool_offsets_m_;
+  bool holds_for_any_tool_ = false;
+  Vector3 tool_line_ = Vector3::Zero();  ///< unit vector; zero: the model is valid for one tool
+  Eigen::VectorXd U_;
+  Eigen::MatrixXd covariance_;
+  /// Cubic tables: U and covariance with the second derivatives (geometry/cell_form.hpp).
+  Eigen::VectorXd Z_;
+  Eigen::MatrixXd cov_Z_;
+  ValidityVolume validity_;
+  std::optional<TravelForm> travel_;
+  std::optional<Misfit> misfit_;
+};
+
+}  // namespace abbe::calib

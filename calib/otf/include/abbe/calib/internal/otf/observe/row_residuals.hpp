@@ -1,0 +1,18 @@
+#pragma once
+/// Residuals of the rows of a run, in row order.
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/otf/observe/observe.hpp"
+
+namespace abbe::calib::otf {
+
+/// y - A U of every row [m]; y itself for an empty U.
+[[nodiscard]] std::vector<double> residuals_m(const Observations&, const Eigen::VectorXd& U);
+
+/// Sum of (residual / sigma)^2.
+[[nodiscard]] double chi2(const Observations&, std::span<const double> residual_m);
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,31 @@
+#pragma once
+/// The path coordinate system of one point and the standard uncertainties along its axes.
+/// [Sanders 2023] eq. (1) and (4), b: unit vector of the beam, a1, a2, a3: axes of the system, with
+/// corrections:
+/// - eq. (1) subtracts the scalar b.a1 from a vector; here (b.a1) a1 is subtracted,
+/// - eq. (4) contains the path direction d, for which a2.d = a3.d = 0; here the beam b is used,
+/// - U_radial in eq. (4) is a length: sigma_angle * range.
+
+#include "abbe/calib/otf/run/run.hpp"
+
+namespace abbe::calib::otf {
+
+/// Unit vectors in machine coordinates: a1 along the path, a2 perpendicular to a1 in the plane of
+/// a1 and the beam, a3 = a1 x a2.
+struct PathFrame {
+  Vector3 a1, a2, a3;
+  double sigma2_m = 0.0;  ///< standard uncertainty of one sample along a2
+  double sigma3_m = 0.0;  ///< standard uncertainty along a3, which is perpendicular to the beam
+};
+
+/// `beam_m`: vector from the tracker to the point in machine coordinates, not zero.
+[[nodiscard]] PathFrame path_frame(const Vector3& direction, const Vector3& beam_m, const Noise&);
+
+/// Covariance of one sample in the tracker frame:
+///     sigma_r^2 er er^T + (sigma_a r)^2 (I - er er^T)
+/// er: unit vector of the beam, r: range, sigma_r: sigma_range_m, sigma_a: sigma_angle_rad. This is
+/// [Sanders 2023] eq. (8) to (10) with angles in place of the lengths of eq. (8): propagating
+/// diag(sigma_r^2, (sigma_a / cos el)^2, sigma_a^2) with the Jacobian gives the same result.
+[[nodiscard]] Matrix3 sample_covariance_m2(const Vector3& p_tracker_m, const Noise&);
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,32 @@
+#pragma once
+/// Errors of the machine that depend on two axes at once: a column that tilts under a saddle, a bed
+/// that bends under a moving load. No table represents them, and what tables, tracker pose and
+/// range offset follow of them makes the model wrong. They are
+///     V_c(q) = sum over pairs (a, b) of axes of D_c,ab s_a s_b,   s_a = (q_a - middle_a) / half_a
+/// c = x, y, z; middle_a, half_a: of the travel, so that D is the error at a corner. D is a random
+/// effect N(0, s^2). s is that of the largest marginal likelihood; D counts as zero if this
+/// likelihood does not exceed that of s = 0 beyond chance. The model does not contain these errors:
+/// they are misfit (abbe/calib/misfit.hpp). They are not searched for in runs with reference nests,
+/// whose drift would follow them, nor in runs with several targets.
+
+#include <array>
+
+#include "abbe/calib/geometry/axis_table.hpp"
+#include "abbe/calib/geometry/rigid_transform.hpp"
+
+namespace abbe::calib::otf {
+
+inline constexpr std::size_t kTwoAxisErrors = 9;
+
+struct TwoAxisErrors {
+  /// D by component and pair: x, y, z of X Y, then of Y Z, then of Z X.
+  std::array<double, kTwoAxisErrors> D_m{}, u_m{};
+
+  /// Products s_a s_b of the pairs X Y, Y Z, Z X.
+  [[nodiscard]] static Vector3 products(const MachineNodes&, const Vector3& q_m);
+  [[nodiscard]] Vector3 V_m(const MachineNodes&, const Vector3& q_m) const;
+  /// rms of each component of V over the volume, with its uncertainty.
+  [[nodiscard]] Vector3 rms_m() const;
+};
+
+}  // namespace abbe::calib::otf

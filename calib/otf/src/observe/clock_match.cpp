@@ -1,0 +1,274 @@
+#include "observe/clock_match.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/internal/base/message.hpp"
+#include "abbe/calib/internal/statistics/median.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+/// A used block: place and direction of travel at a time of the tracker.
+struct TimedPoint {
+  double time_s = 0.0;
+  Vector3 q_m = Vector3::Zero();
+  Vector3 direction = Vector3::UnitX();
+};
+
+/// Distances above this do not differ: at the right offset they are below 1 mm, at a wrong one
+/// centimetres.
+constexpr double kFar_m = 0.02;
+constexpr double kTravelPerStep_m = 2e-3;  ///< between two offsets that are compared
+/// Limits of the distances of the points to the readings: median, and 95 % of them. The gate
+/// accepts errors up to 1 mm.
+constexpr double kMedianLimit_m = 1e-3, kLimit_m = 3e-3;
+constexpr double kLeastCovered = 0.25;  ///< share of the used blocks whose time the log contains
+
+std::vector<TimedPoint> timed_points(const Observations& across, const BlockSeries& series) {
+  std::vector<TimedPoint> points;
+  const RigidTransform& T = across.alignment.T_machine_tracker;
+  for (std::size_t i = 0; i < series.blocks.size(); ++i) {
+    if (across.alignment.used[i]) {
+      const std::size_t leg = across.alignment.leg[i];
+      points.push_back({series.blocks[i].time_s,
+                        T * series.blocks[i].mean_tracker_m - across.target_offset_m,
+                        (across.vertices_m[leg + 1] - across.vertices_m[leg]).normalized()});
+    }
+  }
+  return points;
+}
+
+double median_speed_m_s(std::span<const TimedPoint> points) {
+  std::vector<double> speeds;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    speeds.push_back((points[i].q_m - points[i - 1].q_m).norm() /
+                     (points[i].time_s - points[i - 1].time_s));
+  }
+  return median(speeds);
+}
+
+/// The readings at equal steps of time; without a value in gaps.
+class SteppedLog {
+ public:
+  SteppedLog(const EncoderLines& lines, double wanted_step_s) {
+    constexpr double kMostSteps = 1e6;  // of memory: 24 MB
+    const std::span<const EncoderReading> readings = lines.readings();
+    const double span_s = readings.back().time_s;
+    step_s_ = std::max(wanted_step_s, span_s / kMostSteps);
+    const auto steps = static_cast<std::size_t>(std::floor(span_s / step_s_)) + 1;
+    q_m_.reserve(steps);
+    for (std::size_t i = 0; i < steps; ++i) {
+      const double at_s = static_cast<double>(i) * step_s_;
+      const std::optional<EncoderLine> line = lines.line(at_s, at_s, at_s);
+      q_m_.push_back(line ? line->q_m
+                          : Vector3::Constant(std::numeric_limits<double>::quiet_NaN()));
+    }
+  }
+
+  /// The time of the log at the first point for which the sum of squared distances, each limited to
+  /// kFar_m, is smallest.
+  [[nodiscard]] double best_start_s(std::span<const TimedPoint> points) const {
+    std::vector<std::ptrdiff_t> step_of;
+    const double start_s = points.front().time_s;
+    for (const TimedPoint& p : points) {
+      step_of.push_back(std::lround((p.time_s - start_s) / step_s_));
+    }
+
+    double least = std::numeric_limits<double>::infinity();
+    std::ptrdiff_t best = 0;
+    for (std::ptrdiff_t shift = -step_of.back(); shift < std::ssize(q_m_); ++shift) {
+      const double sum = squares_m2(points, step_of, shift, least);
+      if (sum < least) {
+        least = sum;
+        best = shift;
+      }
+    }
+    return static_cast<double>(best) * step_s_;
+  }
+
+ private:
+  /// Stops above `least`.
+  [[nodiscard]] double squares_m2(std::span<const TimedPoint> points,
+                                  std::span<const std::ptrdiff_t> step_of, std::ptrdiff_t shift,
+                                  double least) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < points.size() && sum < least; ++i) {
+      const std::ptrdiff_t at = step_of[i] + shift;
+      double square = kFar_m * kFar_m;
+      if (at >= 0 && at < std::ssize(q_m_)) {
+        const double found = (points[i].q_m - q_m_[static_cast<std::size_t>(at)]).squaredNorm();
+        square = found < square ? found : square;  // a gap is far
+      }
+      sum += square;
+    }
+    return sum;
+  }
+
+  double step_s_ = 0.0;
+  std::vector<Vector3> q_m_;
+};
+
+/// Points against readings, for a clock; only of points whose time the log contains.
+struct PointToLog {
+  double time_s = 0.0;
+  double distance_m = 0.0;
+  double late_s = 0.0;  ///< correction of the offset from this point
+};
+std::vector<PointToLog> compared(std::span<const TimedPoint> points, const EncoderLines& lines,
+                                 const RunClock& clock) {
+  std::vector<PointToLog> all;
+  for (const TimedPoint& p : points) {
+    const double at_s = clock.since_start_s(p.time_s);
+    if (const std::optional<EncoderLine> line = lines.line(at_s, at_s, at_s)) {
+      const Vector3 difference = p.q_m - line->q_m;
+      const double v_m_s = p.direction.dot(line->v_m_s);
+      all.push_back(
+          {p.time_s, difference.norm(), v_m_s > 1e-4 ? p.direction.dot(difference) / v_m_s : 0.0});
+    }
+  }
+  return all;
+}
+
+/// Corrects the clock by the medians of the corrections of the first and the last half of the
+/// points; only points that are near.
+void correct(RunClock& clock, std::span<const PointToLog> all) {
+  std::vector<PointToLog> near;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(near),
+               [](const PointToLog& p) { return p.distance_m < kFar_m; });
+  constexpr std::size_t kFew = 8;
+  if (near.size() < kFew) {
+    return;
+  }
+
+  const auto median_of = [&](std::size_t begin, std::size_t end, double PointToLog::*member) {
+    std::vector<double> values;
+    for (std::size_t i = begin; i < end; ++i) {
+      values.push_back(near[i].*member);
+    }
+    return median(values);
+  };
+  const std::size_t half = near.size() / 2;
+  const double t1_s = median_of(0, half, &PointToLog::time_s),
+               t2_s = median_of(half, near.size(), &PointToLog::time_s);
+  const double late1_s = median_of(0, half, &PointToLog::late_s),
+               late2_s = median_of(half, near.size(), &PointToLog::late_s);
+  const double drift = (late2_s - late1_s) / (t2_s - t1_s);
+  clock.drift += drift;
+  clock.lag_s += late1_s - drift * (t1_s - clock.reference_s);
+}
+
+/// How well the readings fit with the best clock.
+struct ClockFit {
+  RunClock clock;
+  double median_m = std::numeric_limits<double>::infinity();
+  double share_95_m = std::numeric_limits<double>::infinity();
+  double covered = 0.0;
+
+  [[nodiscard]] bool is_good() const {
+    return median_m <= kMedianLimit_m && share_95_m <= kLimit_m && covered >= kLeastCovered;
+  }
+};
+
+ClockFit fit_at(const RunClock& clock, std::span<const TimedPoint> points,
+                const EncoderLines& lines) {
+  ClockFit fit{.clock = clock};
+  std::vector<double> distances;
+  for (const PointToLog& p : compared(points, lines, clock)) {
+    distances.push_back(p.distance_m);
+  }
+  if (distances.empty()) {
+    return fit;
+  }
+
+  fit.covered = static_cast<double>(distances.size()) / static_cast<double>(points.size());
+  const auto at_95 = distances.begin() + (95 * std::ssize(distances)) / 100;
+  std::nth_element(distances.begin(), at_95, distances.end());
+  fit.share_95_m = *at_95;
+  fit.median_m = median(distances);
+  return fit;
+}
+
+ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines,
+                  double reference_s) {
+  constexpr std::size_t kCompared = 400;  // points determine an offset to 10 ms many times over
+  std::vector<TimedPoint> few;
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / kCompared);
+  for (std::size_t i = 0; i < points.size(); i += stride) {
+    few.push_back(points[i]);
+  }
+
+  const double step_s = kTravelPerStep_m / std::max(1e-4, median_speed_m_s(points));
+  RunClock clock{
+      .lag_s = SteppedLog(lines, step_s).best_start_s(few) - (few.front().time_s - reference_s),
+      .reference_s = reference_s,
+      .log_start_s = lines.log_start_s()};
+  constexpr int kCorrections = 4;  // each leaves a tenth, then the errors of the machine
+  for (int i = 0; i < kCorrections; ++i) {
+    correct(clock, compared(points, lines, clock));
+  }
+  return fit_at(clock, points, lines);
+}
+
+/// Names the mistakes in the readings whose correction makes them fit.
+std::string mistakes_that_fit(std::span<const TimedPoint> points, const EncoderLog& log,
+                              double reference_s) {
+  std::vector<std::string> texts;
+  const auto try_with = [&](const Matrix3& M, const std::string& text) {
+    std::vector<EncoderReading> readings = log.readings;
+    for (EncoderReading& r : readings) {
+      r.q_m = M * r.q_m;
+    }
+    if (best_fit(points, EncoderLines(readings), reference_s).is_good()) {
+      texts.push_back(text);
+    }
+  };
+
+  for (const AxisMistake& mistake : axis_mistakes()) {
+    try_with(mistake.M, mistake.text);
+  }
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    try_with(mistake.factor * Matrix3::Identity(), mistake.text);
+  }
+  return texts.empty() ? "; they are of another run, or incomplete"
+                       : "; they fit with " + or_list(texts);
+}
+
+}  // namespace
+
+Result<RunClock> match_clocks(const EncoderLog& log, const Observations& across,
+                              const BlockSeries& series) {
+  const std::vector<TimedPoint> points = timed_points(across, series);
+  const EncoderLines lines(log.readings);
+  const double reference_s = series.first_time_s;
+  const ClockFit fit =
+      log.known_clock
+          ? fit_at(RunClock::of(*log.known_clock, reference_s, lines.log_start_s()), points, lines)
+          : best_fit(points, lines, reference_s);
+  if (fit.is_good()) {
+    return fit.clock;
+  }
+
+  if (fit.median_m <= kMedianLimit_m && fit.share_95_m <= kLimit_m) {
+    return failure(ErrorCode::AlignmentFailed,
+                   message("scale readings: they contain the times of ", 100.0 * fit.covered,
+                           " % of the blocks only, needs ", 100.0 * kLeastCovered, " %"));
+  }
+
+  const std::string where =
+      log.known_clock ? "with the stated clock" : "at the best offset of the clocks";
+  const std::string how = std::isfinite(fit.median_m)
+                              ? message("are ", 1e3 * fit.median_m, " mm (median) and ",
+                                        1e3 * fit.share_95_m, " mm (95 %)")
+                              : std::string("are at no time of the run");
+  return failure(
+      ErrorCode::AlignmentFailed,
+      message("scale readings: ", where, " they ", how, " from the tracker's points, limits ",
+              1e3 * kMedianLimit_m, " and ", 1e3 * kLimit_m, " mm",
+              log.known_clock ? "" : mistakes_that_fit(points, log, reference_s)));
+}
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,81 @@
+#pragma once
+/// What planning evaluates very often: the information of one leg, and trace(G C) of a path.
+/// A leg is evaluated at evenly spaced points of constant speed, so that its information is a
+/// smooth function of its ends; predict() forms the blocks of a real run.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+
+#include "abbe/calib/geometry/parameter_layout.hpp"
+#include "abbe/calib/internal/geometry/rigid_body_model.hpp"
+#include "abbe/calib/otf/plan/plan_prediction.hpp"
+
+namespace abbe::calib::otf {
+
+struct Leg {
+  Vector3 from_m, to_m;
+  [[nodiscard]] double length_m() const { return (to_m - from_m).norm(); }
+};
+
+/// The two whitened rows of one point: same columns, values along a2 and a3.
+struct PointRows {
+  static constexpr std::size_t kCapacity = DesignColumns::kCapacity + 1;  // range offset
+  std::array<Eigen::Index, kCapacity> column;
+  std::array<double, kCapacity> along_a2, along_a3;
+  std::size_t count = 0;
+};
+
+/// A path in terms of its information H.
+struct PathState {
+  Eigen::MatrixXd H;      ///< lower triangle
+  double value_m2 = 0.0;  ///< trace(G C)
+  Eigen::MatrixXd C;      ///< H^-1; of with_slope() only
+  /// C G C, derivative of -value with respect to H: the information A^T A of a short leg decreases
+  /// the value by trace(A^T A D). Of with_slope() only.
+  Eigen::MatrixXd D;
+};
+
+/// Immutable value.
+class PlanProblem {
+ public:
+  static constexpr double kSpacing_m = 0.0125;
+  static constexpr double kCoarseSpacing_m = 0.025;  ///< for the choice of a leg
+
+  PlanProblem(const PlannedRun&, const ParameterLayout&);
+
+  [[nodiscard]] const PlannedRun& run() const { return run_; }
+  [[nodiscard]] const Eigen::MatrixXd& G() const { return G_; }
+  /// Points of a leg at most `spacing_m` apart; 0 for a leg within the corner exclusions.
+  [[nodiscard]] std::size_t points_of(const Leg&, double spacing_m = kSpacing_m) const;
+
+  /// No leg: a prior of 50 um and 100 urad for each node, which is negligible once a path
+  /// determines the model, and that of the range offset.
+  [[nodiscard]] Eigen::MatrixXd prior() const;
+  /// Adds `factor` times the information of the leg to the lower triangle of H.
+  void add(const Leg&, double factor, Eigen::MatrixXd& H, double spacing_m = kSpacing_m) const;
+  /// trace(H_leg D). `points`: so that a leg and its neighbours are evaluated alike.
+  [[nodiscard]] double trace_with(const Eigen::MatrixXd& D, const Leg&, std::size_t points) const;
+  /// Decrease of value by the leg, exactly, evaluated at `points`.
+  [[nodiscard]] double gain(const PathState&, const Leg&, std::size_t points) const;
+
+  [[nodiscard]] PathState state_of(const Path&) const;
+  [[nodiscard]] PathState state_of(Eigen::MatrixXd H) const;
+  [[nodiscard]] PathState with_slope(PathState) const;
+
+ private:
+  [[nodiscard]] PointRows rows_at(const Leg&, double share, std::size_t points) const;
+
+  /// With Noise::u_range_offset_m the offset of all ranges is the last unknown.
+  [[nodiscard]] bool has_range_offset() const { return run_.noise.u_range_offset_m > 0.0; }
+  [[nodiscard]] Eigen::Index unknowns() const {
+    return static_cast<Eigen::Index>(layout_.fit_size()) + (has_range_offset() ? 1 : 0);
+  }
+
+  PlannedRun run_;
+  ParameterLayout layout_;
+  Eigen::MatrixXd G_;       ///< unknowns() x unknowns(), zero for those that are not of the model
+  Eigen::MatrixXd root_G_;  ///< G = root_G root_G^T
+};
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,38 @@
+#pragma once
+/// Places near reference nests at which a target stands in the stream of the tracker, and whether
+/// it is the target of the machine (nest_visits.hpp).
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/otf/samples/nest_visits.hpp"
+
+namespace abbe::calib::otf {
+
+/// Valid samples within the radius of a nest: indices in the stream.
+struct NearNest {
+  std::size_t nest = 0;
+  std::vector<std::size_t> samples;
+};
+
+/// A group in which the target stands.
+struct Stand {
+  NearNest group;
+  std::vector<std::size_t> samples{};  ///< at which it stands
+  Vector3 mean_m = Vector3::Zero();
+  bool goes_on = false;  ///< before or behind the group, without the time that the beam needs
+};
+
+/// In the order of time.
+[[nodiscard]] std::vector<Stand> stands_near(std::span<const TrackerObservation>,
+                                             const std::vector<Nest>&, const Noise&);
+/// True if the target of the machine arrives or leaves at this place, now or at another time.
+[[nodiscard]] bool is_of_machine(const Stand&, const std::vector<Stand>& all);
+
+/// Covariance of one sample.
+[[nodiscard]] Matrix3 noise_of_sample(const Vector3& p_tracker_m, const Noise&);
+[[nodiscard]] Vector3 mean_position(std::span<const TrackerObservation> samples,
+                                    std::span<const std::size_t> of);
+
+}  // namespace abbe::calib::otf

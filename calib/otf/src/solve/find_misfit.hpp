@@ -1,0 +1,58 @@
+#pragma once
+/// Misfit of runs on the fly (abbe/calib/misfit.hpp), found from their residuals.
+///
+/// Noise of legs that are far apart in time is independent, but what the model cannot represent is
+/// the same whenever a leg comes to the same place. The travel of an axis is divided into sections,
+/// several in each cell between two nodes, and x_i = (x_i,1, x_i,2, ..) is what the tables T of
+/// this axis do to row i. For each section and leg g
+///     b_g = sum_i w_i x_i r_i,   n_g = sum_i w_i x_i x_i^T,   w_i = 1/sigma_i^2
+/// r: residuals. With the misfit variances m_T^2, constant within a section, and the covariance C
+/// of the unknowns U that the noise causes, two legs that are far apart in time have
+///     E[b_g,T b_h,T] = sum_S m_S^2 n_g,TS n_h,TS - B_g,T C B_h,T^T,   B_g = sum_i w_i x_i a_i
+/// a_i: row of the design matrix. Sums over the pairs of legs give the m^2 of each cell as the
+/// solution of a linear system, without any assumption about the noise within a leg. The same with
+/// the cells of the volume in place of sections, and x_i = direction of the row, gives the
+/// variances of V that depend on several axes.
+///
+/// Errors that depend on two axes (two_axis_errors.hpp) are subtracted before and added to u_V.
+///
+/// A misfit is reported if the products of its legs are positive beyond chance; else it is zero.
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/model/misfit.hpp"
+#include "abbe/calib/otf/observe/observe.hpp"
+#include "abbe/calib/otf/run/two_axis_errors.hpp"
+
+namespace abbe::calib::otf {
+
+struct ResidualsOfRun {
+  const Observations& o;
+  std::span<const double> residual_m;  ///< y - A U of the rows, without range offset and drift
+  std::vector<std::size_t> at;         ///< places of its unknowns among those of all runs
+  /// Over which the noise is correlated, unit of Observations::block_s (blocks without times: 1).
+  double correlation_time = 0.0;
+  std::optional<TwoAxisErrors> two_axes{};  ///< subtracted from the residuals
+};
+
+struct FoundMisfit {
+  Misfit misfit;
+  /// What it adds to the covariance of the unknowns: root root^T.
+  Eigen::MatrixXd root_of_covariance;
+  /// What it is, and what can be done about it.
+  std::vector<std::string> notes;
+};
+
+/// All runs have the tables of the first. `of_noise`: covariance of the unknowns that the noise of
+/// the rows causes, `Q`: cofactor matrix of their adjustment with the weights 1/sigma^2. nullopt
+/// without a misfit.
+[[nodiscard]] std::optional<FoundMisfit> find_misfit(std::span<const ResidualsOfRun> runs,
+                                                     const Eigen::MatrixXd& of_noise,
+                                                     const Eigen::MatrixXd& Q);
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "abbe/calib/estimation/datum.hpp"
+#include "abbe/calib/otf/observe/observe.hpp"
+
+namespace abbe::calib::otf {
+
+/// The conditions of gauge G2 (gauge.hpp) as a Datum for the unknowns of the observations.
+[[nodiscard]] estimation::Datum gauge_of(const Observations&);
+
+}  // namespace abbe::calib::otf

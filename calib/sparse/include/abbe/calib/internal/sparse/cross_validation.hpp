@@ -1,0 +1,79 @@
+#pragma once
+/// Choice of lambda, or of gamma and lambda together (penalty.hpp), by cross-validation. For every
+/// gamma one regularisation path is fitted to all rows and one to the training rows of each fold
+/// (standardised separately). The error of a pair (lambda, gamma) is the mean over all rows of the
+/// squared error of the fit that did not use the row; it is missing (NaN) if one of these paths did
+/// not reach lambda within its sweep budget. The pair with the smallest error is chosen, on ties
+/// the one with the smallest index of gamma, then of lambda. For rows that share noise see
+/// folds.hpp.
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "abbe/calib/base/error.hpp"
+#include "abbe/calib/internal/sparse/path.hpp"
+#include "abbe/calib/sparse/folds.hpp"
+
+namespace abbe::calib::sparse {
+
+/// A function of the caller that calls task(0) .. task(count - 1), each once, in any order and on
+/// any threads, and returns when all have returned. This library creates no threads; a caller that
+/// has threads supplies them through this function. The tasks write no shared data; results do not
+/// depend on the order and the threads.
+using ParallelFor =
+    std::function<void(std::size_t count, const std::function<void(std::size_t)>& task)>;
+void serial_for(std::size_t count, const std::function<void(std::size_t)>& task);
+
+struct CrossValidation {
+  Path path;  ///< regularisation path, fitted to all rows
+  /// Mean squared held-out error for each lambda, unit of y squared; NaN: missing.
+  Eigen::VectorXd error;
+  /// Standard error of `error`, with rows taken as independent (too small when rows share noise).
+  Eigen::VectorXd standard_error;
+  double null_error = 0.0;  ///< mean (y - mean)^2: the error of the empty model
+  Eigen::Index best = 0;    ///< index of lambda
+};
+
+/// Errors of fit_path, also for the training rows of every fold (TooFewObservations names the
+/// fold); BadInput if `folds` does not match the rows; NotConverged if the error is missing for
+/// every lambda.
+[[nodiscard]] Result<CrossValidation> cross_validate(const Eigen::MatrixXd& X,
+                                                     const Eigen::VectorXd& y, const Penalty&,
+                                                     const Folds&, const PathOptions& = {},
+                                                     const ParallelFor& = serial_for);
+
+struct GridCell {
+  Eigen::Index lambda = 0, gamma = 0;  ///< indices
+};
+
+struct GridSearch {
+  std::vector<double> gamma;
+  std::vector<double> lambda;
+  Eigen::MatrixXd error;  ///< lambda x gamma, as in CrossValidation: the surface to plot
+  Eigen::MatrixXd standard_error;
+  std::vector<Path> paths;  ///< fitted to all rows, one for each gamma
+  double null_error = 0.0;
+  GridCell best;
+  long sweeps = 0;  ///< of all paths, folds included
+
+  [[nodiscard]] Eigen::VectorXd best_coefficients() const {
+    return paths[static_cast<std::size_t>(best.gamma)].coefficients.col(best.lambda);
+  }
+};
+
+/// Gives the same bits as one call of cross_validate for each gamma. Takes less time: the paths of
+/// one fold for all gamma use the same Gram matrix and are computed in parallel lanes of the vector
+/// registers. One task for all rows and one for each fold.
+[[nodiscard]] Result<GridSearch> grid_search(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                                             PenaltyKind, const std::vector<double>& gamma,
+                                             const Folds&, const PathOptions& = {},
+                                             const ParallelFor& = serial_for);
+
+/// `count` values equally spaced from first to last, both included.
+[[nodiscard]] std::vector<double> equally_spaced(double first, double last, int count);
+/// `count` values equally spaced in the logarithm, for lambda from large to small.
+[[nodiscard]] std::vector<double> log_spaced(double first, double last, int count);
+
+}  // namespace abbe::calib::sparse

@@ -1,0 +1,33 @@
+#pragma once
+/// Squared errors of the rows of one fold, with the paths fitted to the other folds.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "abbe/calib/sparse/folds.hpp"
+#include "path_setup.hpp"
+
+namespace abbe::calib::sparse {
+
+/// Count, mean and sum of squared deviations from the mean of a set of values. add() combines the
+/// moments of two sets without cancellation of digits.
+struct Moments {
+  double count = 0.0;
+  double mean = 0.0;
+  double squares = 0.0;
+
+  void add(const Moments& more);
+};
+
+struct HeldOut {
+  std::vector<std::vector<Moments>> error;  ///< by penalty, then by lambda it reached
+  long sweeps = 0;
+};
+
+/// Fits the rows of `all` that are not in `fold` and computes the errors of the rows in `fold`. The
+/// rows of `all` are standardised; the training rows are standardised again.
+[[nodiscard]] Result<HeldOut> hold_out(const GramProblem& all, const Folds&, int fold,
+                                       const std::vector<Penalty>&, const LambdaList&,
+                                       const PathOptions&);
+
+}  // namespace abbe::calib::sparse

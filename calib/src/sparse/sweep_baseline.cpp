@@ -1,3 +1,0 @@
-#define ABBE_SWEEP_WIDTH 2
-#define ABBE_SWEEP_NAME sweep_baseline
-#include "sparse/sweep_kernel.inc"

@@ -1,0 +1,65 @@
+#pragma once
+/// Stage one of a verification ([Li OMM] section 5.4): computes V_las, the volumetric error
+/// measured with an independent instrument (a laser tracker with its reflector near the tool tip),
+/// from scale readings and the points that the instrument measured there. The pose of the
+/// instrument is known only from these points: its frame is fitted to the readings, and this
+/// removes the best-fit rigid motion (six parameters) from V. V = actual - nominal at the scale
+/// reading.
+///
+/// Several points that were measured at one position of the axes (shots) are one place, with their
+/// means. What is common to the shots of a place (errors of the machine between the nodes of a
+/// model, the seat of the reflector, the air on that beam) does not average out, and a place with
+/// many shots has the same weight as one with a single shot. Lengths in m. Pure; allocates.
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/geometry/rigid_transform.hpp"
+
+namespace abbe::calib::verify {
+
+struct MeasuredPoint {
+  Vector3 reading_m = Vector3::Zero();   ///< axis positions
+  Vector3 measured_m = Vector3::Zero();  ///< in the instrument's frame
+};
+
+/// How the measured points are transformed to machine coordinates.
+/// - BestFit: by T_machine_tracker, which is fitted to the points.
+/// - Machine: the axes of the instrument are already parallel to those of the machine; V keeps its
+///   rotation and the unknown constant vector between reflector and axis positions.
+enum class Frame { BestFit, Machine };
+
+/// One entry per place, in the order of the first shots.
+struct Observations {
+  Frame frame = Frame::BestFit;
+  RigidTransform T_machine_tracker;
+  std::vector<Vector3> readings_m;              ///< means of the shots
+  std::vector<Vector3> measured_m;              ///< means, in the instrument's frame
+  std::vector<Vector3> V_m;                     ///< T measured - reading
+  std::vector<std::vector<std::size_t>> shots;  ///< indices of the measured points of each place
+  /// Standard deviation of a shot from the mean of its place (length of the vector), pooled over
+  /// the places. nullopt: every place has one shot.
+  std::optional<double> repeatability_m{};
+
+  [[nodiscard]] std::size_t shot_count() const noexcept;
+};
+
+/// Largest distance of the scale readings of a shot from those of the first shot of its place, and
+/// its limit as a fraction of the extent of the points, for small machines. An axis returns to its
+/// target within some um; one that is driven by hand, within some tenths of a millimetre.
+inline constexpr double kSamePlace_m = 1e-3;
+inline constexpr double kSamePlaceOfExtent = 1.0 / 500.0;
+
+/// Largest permitted rms residual after the rigid fit, as a fraction of the extent of the points.
+/// Errors of machines are smaller. Exchanged rows, coordinates in inches or a left-handed frame
+/// give larger residuals.
+inline constexpr double kMostLackOfFit = 0.01;
+
+/// Errors: NotFinite; TooFewObservations for fewer than 4 places; DegenerateGeometry if the places
+/// do not span a volume; AlignmentFailed if the residuals exceed kMostLackOfFit (with
+/// Frame::Machine after subtraction of their mean).
+[[nodiscard]] Result<Observations> observe(std::span<const MeasuredPoint>, Frame = Frame::BestFit);
+
+}  // namespace abbe::calib::verify

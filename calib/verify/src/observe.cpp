@@ -1,0 +1,205 @@
+#include "abbe/calib/verify/observe.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/internal/base/message.hpp"
+#include "abbe/calib/model/model_comparison.hpp"
+#include "extent.hpp"
+
+namespace abbe::calib::verify {
+namespace {
+
+Result<void> check_finite(std::span<const MeasuredPoint> points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].reading_m.allFinite() || !points[i].measured_m.allFinite()) {
+      return failure(ErrorCode::NotFinite,
+                     message("verification: point ", i + 1, " is not finite"));
+    }
+  }
+  return {};
+}
+
+/// Text "; they fit with ..." that names the mistakes after whose correction the points fit the
+/// readings: a reflection, another unit, reversed order of the rows. Empty if no tested correction
+/// makes them fit. It tests the shots: means of places mix rows that are in the wrong order.
+std::string fits_with(std::span<const MeasuredPoint> points, double most_rms_m) {
+  const auto fits = [&](const Matrix3& M, bool backwards) {
+    std::vector<Vector3> from, readings_m;
+    for (const MeasuredPoint& p : points) {
+      from.emplace_back(M * p.measured_m);
+      readings_m.push_back(p.reading_m);
+    }
+    if (backwards) {
+      std::reverse(from.begin(), from.end());
+    }
+    const auto T = fit_rigid(from, readings_m);
+    std::vector<Vector3> left;
+    for (std::size_t i = 0; T && i < from.size(); ++i) {
+      left.emplace_back(*T * from[i] - readings_m[i]);
+    }
+    return T && vector_statistics(left).rms_m <= most_rms_m;
+  };
+
+  std::vector<std::string> texts;
+  if (fits(Matrix3::Identity(), false)) {
+    texts.emplace_back("a frame that is fitted to the readings (--frame fit)");
+  }
+
+  if (fits(Vector3(-1.0, 1.0, 1.0).asDiagonal(), false)) {
+    texts.emplace_back("one axis reversed or two axes swapped (a left-handed frame)");
+  }
+
+  if (fits(Matrix3::Identity(), true)) {
+    texts.emplace_back("the measured points in the opposite order");
+  }
+
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    for (const auto& [factor, of] :
+         {std::pair{mistake.factor, "measured points"}, {1.0 / mistake.factor, "readings"}}) {
+      if (fits(factor * Matrix3::Identity(), false)) {
+        texts.push_back(message(mistake.text, " (", of, ")"));
+      }
+    }
+  }
+
+  return texts.empty() ? "" : "; they fit with " + or_list(texts);
+}
+
+Result<void> check_lack_of_fit(const Observations& o, std::span<const MeasuredPoint> points,
+                               const Extent& extent) {
+  Vector3 mean = Vector3::Zero();
+  for (const Vector3& v : o.V_m) {
+    mean += v / static_cast<double>(o.V_m.size());
+  }
+
+  std::vector<Vector3> left;
+  for (const Vector3& v : o.V_m) {
+    left.push_back(v - mean);
+  }
+
+  const double rms_m = vector_statistics(left).rms_m;
+  if (rms_m > kMostLackOfFit * extent.diagonal_m()) {
+    return failure(ErrorCode::AlignmentFailed,
+                   message("verification: readings and measured points of ", extent.diagonal_m(),
+                           " m extent leave ", rms_m, " m rms",
+                           o.frame == Frame::BestFit ? " after the best rigid motion"
+                                                     : " in the machine's axes",
+                           ": rows in the wrong order, another unit, or a left-handed frame",
+                           fits_with(points, kMostLackOfFit * extent.diagonal_m())));
+  }
+
+  return {};
+}
+
+/// Distance of the readings up to which two shots are of one place.
+double same_place_m(std::span<const MeasuredPoint> points) {
+  Vector3 low = points.empty() ? Vector3::Zero() : points.front().reading_m, high = low;
+  for (const MeasuredPoint& p : points) {
+    low = low.cwiseMin(p.reading_m);
+    high = high.cwiseMax(p.reading_m);
+  }
+  return std::min(kSamePlace_m, kSamePlaceOfExtent * (high - low).norm());
+}
+
+/// The shots of each place, in the order of the first shots. A shot belongs to the first place
+/// whose first shot is near enough: a row of points at small distances does not become one place.
+std::vector<std::vector<std::size_t>> shots_of_places(std::span<const MeasuredPoint> points,
+                                                      double same_place_m) {
+  std::vector<std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto place =
+        std::find_if(places.begin(), places.end(), [&](const std::vector<std::size_t>& shots) {
+          return (points[shots.front()].reading_m - points[i].reading_m).norm() <= same_place_m;
+        });
+    if (place == places.end()) {
+      places.push_back({i});
+    } else {
+      place->push_back(i);
+    }
+  }
+  return places;
+}
+
+/// The mean of the shots.
+MeasuredPoint mean_of_place(std::span<const MeasuredPoint> points,
+                            const std::vector<std::size_t>& shots) {
+  // Relative to the first shot: the mean of a single shot is the shot, bit by bit.
+  MeasuredPoint mean = points[shots.front()];
+  Vector3 reading = Vector3::Zero(), measured = Vector3::Zero();
+  for (const std::size_t shot : shots) {
+    reading += points[shot].reading_m - mean.reading_m;
+    measured += points[shot].measured_m - mean.measured_m;
+  }
+  mean.reading_m += reading / static_cast<double>(shots.size());
+  mean.measured_m += measured / static_cast<double>(shots.size());
+  return mean;
+}
+
+/// See Observations::repeatability_m.
+std::optional<double> repeatability_m(std::span<const MeasuredPoint> points,
+                                      const Observations& o) {
+  if (points.size() == o.shots.size()) {
+    return std::nullopt;
+  }
+  double squares = 0.0;
+  for (std::size_t place = 0; place < o.shots.size(); ++place) {
+    for (const std::size_t shot : o.shots[place]) {
+      const Vector3 V = o.T_machine_tracker * points[shot].measured_m - points[shot].reading_m;
+      squares += (V - o.V_m[place]).squaredNorm();
+    }
+  }
+  return std::sqrt(squares / static_cast<double>(points.size() - o.shots.size()));
+}
+
+}  // namespace
+
+std::size_t Observations::shot_count() const noexcept {
+  std::size_t count = 0;
+  for (const auto& of_place : shots) {
+    count += of_place.size();
+  }
+  return count;
+}
+
+Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame) {
+  if (auto finite = check_finite(points); !finite) {
+    return tl::make_unexpected(finite.error());
+  }
+
+  Observations o;
+  o.frame = frame;
+  o.shots = shots_of_places(points, same_place_m(points));
+  for (const auto& shots : o.shots) {
+    const MeasuredPoint mean = mean_of_place(points, shots);
+    o.readings_m.push_back(mean.reading_m);
+    o.measured_m.push_back(mean.measured_m);
+  }
+
+  const auto extent = extent_of(o.readings_m);
+  if (!extent) {
+    return tl::make_unexpected(extent.error());
+  }
+
+  if (frame == Frame::BestFit) {
+    const auto T = fit_rigid(o.measured_m, o.readings_m);
+    if (!T) {
+      return tl::make_unexpected(T.error());
+    }
+    o.T_machine_tracker = *T;
+  }
+
+  for (std::size_t place = 0; place < o.shots.size(); ++place) {
+    o.V_m.emplace_back(o.T_machine_tracker * o.measured_m[place] - o.readings_m[place]);
+  }
+  o.repeatability_m = repeatability_m(points, o);
+
+  if (auto fits = check_lack_of_fit(o, points, *extent); !fits) {
+    return tl::make_unexpected(fits.error());
+  }
+
+  return o;
+}
+
+}  // namespace abbe::calib::verify

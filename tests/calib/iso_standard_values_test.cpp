@@ -288,10 +288,9 @@ TEST(StandardValues, AreThoseOfVForTablesAndPolynomials) {
   for (double& value : c) {
     value = 1e-5 * normal(random);
   }
-  const auto polynomials =
-      PolynomialModel::of(design, Vector3::Zero(), c,
-                                 kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
-          .value();
+  const auto polynomials = PolynomialModel::of(design, Vector3::Zero(), c,
+                                               kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
+                               .value();
   const auto model =
       VolumetricModel::from_polynomials(polynomials, Gauge::Ball1, kIsoTool, volume).value();
   expect_values_of_V(model);
@@ -533,13 +532,12 @@ TEST(StandardValues, StraightnessOfAPolynomialIsThatOfItsCurve) {
   const Eigen::VectorXd c = rows.completeOrthogonalDecomposition().solve(wanted);
   ASSERT_LT((rows * c - wanted).norm(), 1e-12) << "the polynomials contain P3";
 
-  const auto model =
-      VolumetricModel::from_polynomials(
-          PolynomialModel::of(design, Vector3::Zero(), c,
-                                     kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
-              .value(),
-          Gauge::Ball1, kIsoTool, volume)
-          .value();
+  const auto model = VolumetricModel::from_polynomials(
+                         PolynomialModel::of(design, Vector3::Zero(), c,
+                                             kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
+                             .value(),
+                         Gauge::Ball1, kIsoTool, volume)
+                         .value();
   // P3 has no part of a line: the reference line is 0.
   const auto values = iso::standard_values(model).value();
   EXPECT_NEAR(straightness_named(values, "EYX").range.value, 20e-6, 0.2e-6);

@@ -128,7 +128,7 @@ Eigen::VectorXd constant_errors(const ParameterLayout& layout,
 TableBasis paper_basis() {
   const MfbMachine machine = paper_machine();
   return *TableBasis::of(*ParameterLayout::all_tables(machine.chain, machine.nodes),
-                                TableOptions::all_axes(machine.interpolation));
+                         TableOptions::all_axes(machine.interpolation));
 }
 
 Vector3 V_of(const TableBasis& basis, const Eigen::VectorXd& U, const Vector3& q_m,

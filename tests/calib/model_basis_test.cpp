@@ -184,7 +184,7 @@ TEST(ModelBasis, AnAxisThatHasNotMovedHasTheMeanOfBothDirections) {
 
 TEST(ModelBasis, OfPolynomialsHasTheColumnsOfTheScaledDesign) {
   const auto design = ScaledDesign::of(*KinematicChain::parse("[w b Z X Y t]"), 3,
-                                              {{0.1, -0.2, 0.05}, {0.3, 0.2, 0.1}});
+                                       {{0.1, -0.2, 0.05}, {0.3, 0.2, 0.1}});
   const ModelBasis basis{PolynomialBasis(*design)};
   const MachineState state{.q_m = {0.21, -0.13, 0.02}};
   OwnColumns columns(basis);

@@ -189,9 +189,9 @@ TEST(Moments, KnowTheDirectionOfTravel) {
 
 TEST(Moments, OfCubicTablesAreRefused) {
   const auto moments = MomentAccumulator::of(
-      {moment_basis(case_a_machine(), {.interpolation = {Interpolation::Linear,
-                                                         Interpolation::NaturalCubic,
-                                                         Interpolation::Linear}}),
+      {moment_basis(case_a_machine(),
+                    {.interpolation = {Interpolation::Linear, Interpolation::NaturalCubic,
+                                       Interpolation::Linear}}),
        Vector3::Zero(),
        {},
        Noise{}});

@@ -60,7 +60,7 @@ struct MadeTargets {
 
   [[nodiscard]] TableBasis basis() const {
     return *TableBasis::of(*ParameterLayout::all_tables(machine.chain, machine.nodes),
-                                  TableOptions::all_axes(machine.interpolation));
+                           TableOptions::all_axes(machine.interpolation));
   }
   [[nodiscard]] Vector3 V_m(const Vector3& q, const Vector3& t) const {
     return basis().V_m({.q_m = q, .tool_offset_m = t},

@@ -82,11 +82,10 @@ class DirectionOfTravel : public testing::TestWithParam<FormOfTravel> {
  protected:
   const WithTravel made_ = model_with_travel(std::get<0>(GetParam()), std::get<1>(GetParam()));
 };
-INSTANTIATE_TEST_SUITE_P(Forms, DirectionOfTravel,
-                         testing::Combine(testing::Values(TravelDependence::Backlash,
-                                                          TravelDependence::Tables),
-                                          testing::Values(Interpolation::Linear,
-                                                          Interpolation::NaturalCubic)));
+INSTANTIATE_TEST_SUITE_P(
+    Forms, DirectionOfTravel,
+    testing::Combine(testing::Values(TravelDependence::Backlash, TravelDependence::Tables),
+                     testing::Values(Interpolation::Linear, Interpolation::NaturalCubic)));
 
 TEST_P(DirectionOfTravel, OfAllAxesGivesVOfTheJointParameters) {
   const Eigen::VectorXd U = all_values(made_.model);
@@ -160,8 +159,7 @@ TEST_P(DirectionOfTravel, IsRefusedWithAnotherCovariance) {
 
 /// Of an axis that moved in one direction only the prior remains: V is not known in either.
 TEST(UndeterminedDifference, IsInTheUncertaintyOfEachDirection) {
-  const WithTravel made =
-      model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
+  const WithTravel made = model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
   TravelDifferences d = *made.model.travel();
   d.cov_U_D.col(0).setZero();  // EXX
   d.covariance.row(0).setZero();
@@ -176,8 +174,7 @@ TEST(UndeterminedDifference, IsInTheUncertaintyOfEachDirection) {
 
 /// An update, or common tables, would lose the differences without a message.
 TEST(ModelWithDifferences, IsNeitherUpdatedNorJoined) {
-  const WithTravel made =
-      model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
+  const WithTravel made = model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
   ModelDescription d = made.model.description();
   d.travel.reset();
   const VolumetricModel without = *VolumetricModel::from_description(d);
@@ -193,8 +190,7 @@ TEST(ModelWithDifferences, IsNeitherUpdatedNorJoined) {
 }
 
 TEST(ModelWithoutDifferences, IsTheSameInEveryDirection) {
-  const WithTravel made =
-      model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
+  const WithTravel made = model_with_travel(TravelDependence::Backlash, Interpolation::Linear);
   ModelDescription d = made.model.description();
   d.travel.reset();
   const VolumetricModel model = *VolumetricModel::from_description(d);

@@ -77,8 +77,8 @@ VolumetricModel reference_model(const std::string& solution) {
   std::vector<Vector3> balls;
   for (const auto& position : tests::evemu::reference_layout().true_m)
     balls.insert(balls.end(), position.begin(), position.end());
-  const auto design = *ScaledDesign::of(tests::evemu::reference_machine().chain, 3,
-                                               bounding_box(balls));
+  const auto design =
+      *ScaledDesign::of(tests::evemu::reference_machine().chain, 3, bounding_box(balls));
   const Eigen::VectorXd named = tests::evemu::reference_coefficients(solution);
   const Eigen::VectorXd c = (1000.0 * design.named_from_scaled()).fullPivLu().solve(named);
   const auto n = static_cast<Eigen::Index>(design.size());

@@ -221,12 +221,11 @@ TEST(VolumetricModel, OfTablesHasTheirNodesAndNoPolynomials) {
 /// The nodes of polynomials are a grid over the bounding box of the validity volume.
 TEST(VolumetricModel, OfPolynomialsHasNodesOverItsVolumeAndNoTables) {
   const Made m = random_model(1e-4);
-  const auto design =
-      ScaledDesign::of(m.layout.chain(), 2, {{0.0, 0.0, -0.2}, {0.3, 0.25, 0.2}});
+  const auto design = ScaledDesign::of(m.layout.chain(), 2, {{0.0, 0.0, -0.2}, {0.3, 0.25, 0.2}});
   const auto n = static_cast<Eigen::Index>(design->size());
   const auto polynomials =
       PolynomialModel::of(*design, Vector3::Zero(), Eigen::VectorXd::Constant(n, 1e-5),
-                                 Eigen::MatrixXd::Identity(n, n) * 1e-12);
+                          Eigen::MatrixXd::Identity(n, n) * 1e-12);
   const auto model =
       VolumetricModel::from_polynomials(*polynomials, Gauge::Ball1, kTool, whole_volume(m.layout));
   ASSERT_TRUE(model) << model.error().text;

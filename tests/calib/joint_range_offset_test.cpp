@@ -56,7 +56,7 @@ double difference_in_u(const VolumetricModel& a, const VolumetricModel& b) {
       .maxCoeff();
 }
 
-TEST(SharedRangeOffset, OfOneRunAloneIsItsOwn) {
+TEST(OffsetOfAPlace, OfOneRunAloneIsItsOwn) {
   const otf::Solution run = solution_of(run_with_offset(30e-6, 1));
   const joint::CommonTables common = *joint::tables_of(run.model);
   const std::vector with{part_of("run", run, common, "home 1")},
@@ -76,7 +76,7 @@ TEST(SharedRangeOffset, OfOneRunAloneIsItsOwn) {
 }
 
 /// Two runs know the common offset better than one: by 1 / sqrt(2) where the prior does not count.
-TEST(SharedRangeOffset, OfTwoRunsIsKnownFromBothAndThePriorCountsOnce) {
+TEST(OffsetOfAPlace, OfTwoRunsIsKnownFromBothAndThePriorCountsOnce) {
   constexpr double kOffset_m = 30e-6;
   const otf::Solution one = solution_of(run_with_offset(kOffset_m, 1)),
                       two = solution_of(run_with_offset(kOffset_m, 2));
@@ -97,7 +97,7 @@ TEST(SharedRangeOffset, OfTwoRunsIsKnownFromBothAndThePriorCountsOnce) {
 }
 
 /// Runs of another home position have another offset: named as the same, they contradict.
-TEST(SharedRangeOffset, ThatIsNotSharedIsAContradiction) {
+TEST(OffsetOfAPlace, ThatIsNotSharedIsAContradiction) {
   const otf::Solution one = solution_of(run_with_offset(60e-6, 1)),
                       two = solution_of(run_with_offset(-60e-6, 2));
   const joint::CommonTables common = *joint::tables_of(one.model);
@@ -114,7 +114,7 @@ TEST(SharedRangeOffset, ThatIsNotSharedIsAContradiction) {
 }
 
 /// Four pairs of runs with a common offset: 31 combinations each, the mean scatters by 0.13.
-TEST(SharedRangeOffset, UncertaintyIsHonest) {
+TEST(OffsetOfAPlace, UncertaintyIsHonest) {
   double normalised = 0.0;
   constexpr unsigned kPairs = 4;
   std::mt19937_64 random(4);
@@ -138,7 +138,7 @@ TEST(SharedRangeOffset, UncertaintyIsHonest) {
   EXPECT_NEAR(normalised, 1.0, 0.3);
 }
 
-TEST(SharedRangeOffset, NeedsAnEstimateOfTheRun) {
+TEST(OffsetOfAPlace, NeedsAnEstimateOfTheRun) {
   const MadeRun run = make_run({.seed = 3});
   const otf::Solution solution = solution_of(run);
   EXPECT_FALSE(solution.offset_in_model);

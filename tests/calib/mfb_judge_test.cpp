@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <functional>
 #include <random>
 #include <set>
 #include <string>
@@ -18,7 +20,6 @@ using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::Not;
 
 Identification identified(unsigned seed, const Plan& plan = paper_plan(),
                           const ProbingOptions& options = {}) {
@@ -185,30 +186,51 @@ TEST(MfbJudge, AsksByNameForABarThatIsFarFrom20C) {
 
 // With the fewest positions no residual shows that the bar was warmer at one of them.
 TEST(MfbJudge, AsksByNameForABarThatWasWarmerAtOnePosition) {
-  const auto with = [](double by_K, double slope_K) {
+  const auto positions = usual_identification().observations.positions.size();
+  const auto with = [](const std::function<double(std::size_t position)>& off_K) {
     Identification found = usual_identification();
     found.observations.bar.expansion = Expansivity{11.5e-6, 0.2e-6};
-    auto& passes = found.observations.passes;
-    for (std::size_t i = 0; i < passes.size(); ++i) {
-      passes[i].temperature_K += slope_K * static_cast<double>(passes[i].position);
-      passes[i].temperature_K += passes[i].position == passes[3].position ? by_K : 0.0;
+    for (PassObservation& pass : found.observations.passes) {
+      pass.temperature_K += off_K(pass.position);
     }
     return found;
   };
-  for (const double by_K : {2.0, -2.0, 6.0}) {
-    const Identification found = with(by_K, 0.1);
-    const auto verdict = judge(found, nullptr).value();
-    EXPECT_THAT(verdict.causes, Contains(std::string(kBarTemperature)));
-    EXPECT_THAT(verdict.reasons,
-                Contains(HasSubstr(" K from that of the positions before and after it: its "
-                                   "lengths change by ")));
-    EXPECT_TRUE(judge(found, nullptr, {.accept_bar_temperature = true})->accepted);
+  for (const std::size_t at :
+       {std::size_t{0}, std::size_t{1}, std::size_t{3}, positions - 2, positions - 1}) {
+    for (const double by_K : {2.0, -6.0}) {
+      const Identification found = with(
+          [&](std::size_t p) { return 0.1 * static_cast<double>(p) + (p == at ? by_K : 0.0); });
+      const auto verdict = judge(found, nullptr).value();
+      EXPECT_THAT(verdict.causes, ElementsAre(std::string(kBarTemperatureChange)));
+      const auto& passes = found.observations.passes;
+      const auto pass = std::ranges::find(passes, at, &PassObservation::position);
+      EXPECT_THAT(
+          verdict.reasons,
+          ElementsAre(AllOf(HasSubstr(found.observations.plan.measurements[pass->measurement].name +
+                                      ": the temperature of the bar is "),
+                            HasSubstr(" K from that of the positions next to it: its "
+                                      "lengths change by "))));
+      EXPECT_TRUE(judge(found, nullptr, {.accept_bar_temperature_change = true})->accepted);
+      EXPECT_FALSE(judge(found, nullptr, {.accept_bar_temperature = true})->accepted);
+    }
   }
-  EXPECT_TRUE(judge(with(0.5, 0.0), nullptr)->accepted);
-  EXPECT_TRUE(judge(with(0.0, 0.5), nullptr)->accepted) << "a bar that warms up";
 }
 
-// Far from 20 C the uncertain expansion leaves no scale determined; further positions do not help.
+TEST(MfbJudge, AcceptsABarThatWarmsUpAndOneThatIsWarmerTheNextMorning) {
+  const auto accepted = [](const std::function<double(double position)>& off_K) {
+    Identification found = usual_identification();
+    found.observations.bar.expansion = Expansivity{11.5e-6, 0.2e-6};
+    for (PassObservation& pass : found.observations.passes) {
+      pass.temperature_K += off_K(static_cast<double>(pass.position));
+    }
+    return judge(found, nullptr)->accepted;
+  };
+  EXPECT_TRUE(accepted([](double p) { return 0.8 * p - 5.0; }));
+  EXPECT_TRUE(accepted([](double p) { return p < 5.0 ? 0.0 : 3.0; }));
+  EXPECT_TRUE(accepted([](double p) { return p == 3.0 ? 0.5 : 0.0; }));
+}
+
+// Far from 20 C the uncertain expansion leaves no scale determined.
 TEST(MfbJudge, NamesTheTemperatureThatLeavesTheScalesUndetermined) {
   Plan plan = paper_plan();
   for (Measurement& m : plan.measurements) {
@@ -223,8 +245,8 @@ TEST(MfbJudge, NamesTheTemperatureThatLeavesTheScalesUndetermined) {
   ASSERT_FALSE(found);
   EXPECT_THAT(found.error().text,
               AllOf(HasSubstr("do not show EXX"), HasSubstr("the temperature of the bar is 68.9 C"),
-                    HasSubstr("check temperature_C, in degrees Celsius"),
-                    Not(HasSubstr("measure in further positions"))));
+                    HasSubstr("check temperature_C, in degrees Celsius, or measure in further "
+                              "positions")));
 }
 
 TEST(MfbJudge, StatesOnWhatTheScaleDepends) {

@@ -34,7 +34,8 @@ calib::mfb::Plan random_plan(std::mt19937_64& random) {
   return plan;
 }
 
-/// The bar is a few kelvin from 20 degC; its thermometer, and the temperature at each position, are
+/// The bar is a few kelvin from 20 degC, warms up or cools down, and one session in three goes on the
+/// next morning at another temperature. Its thermometer, and the temperature at each position, are
 /// wrong by errors of the stated uncertainty.
 void measure_temperature(MfbRun& run) {
   std::mt19937_64& random = run.random;
@@ -44,13 +45,21 @@ void measure_temperature(MfbRun& run) {
   run.plan.noise.u_temperature_K = uniform(random, 0.05, 0.2);
   run.plan.noise.u_common_temperature_K = uniform(random, 0.05, 0.2);
   const double common_K = *run.plan.noise.u_common_temperature_K * normal(random);
-  std::map<std::string, double> of_position;
+  const double slope_K = uniform(random, -0.3, 0.3);
+  const std::size_t next_morning = random() % 3 == 0 ? 2 + random() % 8 : 100;
+  const double step_K = uniform(random, -3.0, 3.0);
+  std::map<std::string, double> measured_K;
+  run.probing.warmer_at_K.clear();
   for (calib::mfb::Measurement& m : run.plan.measurements) {
-    const auto [at, added] = of_position.try_emplace(m.position, 0.0);
-    if (added) {
-      at->second = run.plan.noise.u_temperature_K * normal(random);
+    const std::size_t position = measured_K.size();
+    if (!measured_K.contains(m.position)) {
+      const double warmer_K =
+          slope_K * static_cast<double>(position) + (position >= next_morning ? step_K : 0.0);
+      run.probing.warmer_at_K[m.position] = warmer_K;
+      measured_K[m.position] = run.probing.warmer_K + warmer_K + common_K +
+                               run.plan.noise.u_temperature_K * normal(random);
     }
-    m.temperature_K = calib::kReferenceTemperature_K + run.probing.warmer_K + common_K + at->second;
+    m.temperature_K = calib::kReferenceTemperature_K + measured_K.at(m.position);
   }
 }
 
@@ -278,7 +287,7 @@ std::vector<Fault<MfbRun>> mfb_faults() {
            if (m.position == position) *m.temperature_K += by_K;
          }
        },
-       {{"measurement", "bar-temperature"}}},
+       {{"measurement", "bar-temperature-change"}}},
       {"expansion of another material",
        [](MfbRun& r) {
          const double alpha_per_K = r.random() % 2 == 0 ? 23e-6 : 0.5e-6;

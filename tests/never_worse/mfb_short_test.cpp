@@ -48,7 +48,10 @@ TEST(NeverWorseBar, DegreesFahrenheitAreAskedForByName) {
 }
 
 TEST(NeverWorseBar, ErrorsBetweenTheNodesAreRefused) {
-  EXPECT_FALSE(with_fault("waves of 2..20 um, 60 mm", kSeed).accepted);
+  const Outcome o = with_fault("waves of 2..20 um, 60 mm", kSeed);
+  EXPECT_FALSE(o.accepted);
+  EXPECT_THAT(o.first_cause, testing::AnyOf("unknown", "measurement", "drift", "hole"))
+      << o.first_reason;
 }
 
 }  // namespace

@@ -122,6 +122,8 @@ struct ProbingOptions {
   double origin_m = 0.5e-3, axes_rad = 0.5e-3;  ///< pose beside the plan
   std::optional<calib::Expansivity> expansion;  ///< as the bar states it
   double warmer_K = 0.0;                        ///< the bar above 20 degC, as measured
+  /// In addition, by position.
+  std::map<std::string, double> warmer_at_K{};
   double alpha_error_per_K = 0.0;
   std::optional<calib::mfb::Sag> sag;
   calib::mfb::TouchPattern pattern = paper_pattern();  ///< of the bar
@@ -271,8 +273,10 @@ class Probing {
   Vector3 in_bar_m(std::size_t k, const calib::mfb::Measurement& m, const Clamping& clamping,
                    const TouchMade& made) const {
     const double alpha_per_K = options_.expansion ? options_.expansion->alpha_per_K : 0.0;
-    Vector3 p_m =
-        (1.0 + options_.warmer_K * (alpha_per_K + options_.alpha_error_per_K)) * tips_m_[k];
+    const auto at = options_.warmer_at_K.find(m.position);
+    const double warmer_K =
+        options_.warmer_K + (at == options_.warmer_at_K.end() ? 0.0 : at->second);
+    Vector3 p_m = (1.0 + warmer_K * (alpha_per_K + options_.alpha_error_per_K)) * tips_m_[k];
     if (options_.sag) {
       p_m += sag_m(*options_.sag, tips_m_[k].x(), m.axes().transpose() * plan_.gravity);
     }

@@ -46,6 +46,9 @@ Config first_of(const Pairs<Config, Calib, N>& pairs, Calib value) {
   return pairs.front().first;
 }
 
+// The defaults of the configuration are those of calib.
+static_assert(AirConfig{}.wavelength_m == calib::kHeliumNeon_m);
+
 }  // namespace
 
 calib::Interpolation calib_of(TableInterpolation v) noexcept {

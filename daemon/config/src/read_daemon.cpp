@@ -150,13 +150,14 @@ void read_gate(ClassifiedSection& root, Config& out) {
     for (const auto& name : gate.accept)
       if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume &&
           name != calib::kScaleChange && name != calib::otf::kPathOrientation &&
-          name != calib::mfb::kBarTemperature && name != calib::otf::kOtherBeams)
+          name != calib::mfb::kBarTemperature && name != calib::mfb::kBarTemperatureChange &&
+          name != calib::otf::kOtherBeams)
         section.fault(
             "accept",
-            fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\", \"{}\", \"{}\" or \"{}\"", name,
-                        calib::evemu::kShapeOnly, calib::kSmallerVolume, calib::kScaleChange,
+            fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\", \"{}\", \"{}\", \"{}\" or \"{}\"",
+                        name, calib::evemu::kShapeOnly, calib::kSmallerVolume, calib::kScaleChange,
                         calib::otf::kPathOrientation, calib::mfb::kBarTemperature,
-                        calib::otf::kOtherBeams));
+                        calib::mfb::kBarTemperatureChange, calib::otf::kOtherBeams));
   }
 
   section.close();

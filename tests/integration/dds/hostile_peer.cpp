@@ -3,12 +3,11 @@
 //   dds_hostile_peer DOMAIN SEED            everything
 //   dds_hostile_peer DOMAIN SEED dispose    only samples that dispose or unregister an instance,
 //                                           with and without key
-//   dds_hostile_peer DOMAIN SEED numbers    only gaps of numbers far apart, and heartbeats that
-//   skip
-//                                           a million million numbers
-//   dds_hostile_peer DOMAIN SEED tokens     only messages of authentication, whole and in
-//   fragments,
-//                                           that state four thousand million tokens
+//   dds_hostile_peer DOMAIN SEED numbers    only gaps of numbers far apart, and heartbeats
+//                                           that skip a million million numbers
+//   dds_hostile_peer DOMAIN SEED tokens     only messages of authentication, whole and
+//                                           in fragments, that state four thousand
+//                                           million tokens
 //   dds_hostile_peer DOMAIN SEED forged     only vectors of 999 um, unsigned, with the GUIDs of the
 //                                           writers that the other participants may have
 //   dds_hostile_peer DOMAIN SEED claims     80 participants, each with the Identity of a machine of

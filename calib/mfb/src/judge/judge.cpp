@@ -60,20 +60,18 @@ void judge_set_aside(Verdict& verdict, const Identification& found) {
   }
 }
 
-/// Refuses a temperature of the bar that is not plausible.
-void judge_temperature(Verdict& verdict, const Observations& o, bool accepted) {
-  for (const auto& seen : {bar_far_from_reference(o), bar_unlike_neighbours(o)}) {
-    if (!seen) {
-      continue;
-    }
-    if (accepted) {
-      verdict.notes.push_back(message(*seen, ", explicitly accepted"));
-    } else {
-      verdict.refuse(
-          kBarTemperature,
-          message(*seen, "; check temperature_C, in degrees Celsius; if it is right, accept ",
-                  kBarTemperature));
-    }
+/// Refuses a temperature of the bar that is not plausible, unless it is accepted by name.
+void judge_temperature(Verdict& verdict, const std::optional<std::string>& seen,
+                       std::string_view name, bool accepted) {
+  if (!seen) {
+    return;
+  }
+  if (accepted) {
+    verdict.notes.push_back(message(*seen, ", explicitly accepted"));
+  } else {
+    verdict.refuse(
+        name,
+        message(*seen, "; check temperature_C, in degrees Celsius; if it is right, accept ", name));
   }
 }
 
@@ -99,7 +97,10 @@ Result<Verdict> judge(const Identification& found, const VolumetricModel* active
   Verdict verdict = decide(found.model, *figures, options.limits, active);
   judge_chi_square(verdict, found);
   judge_set_aside(verdict, found);
-  judge_temperature(verdict, found.observations, options.accept_bar_temperature);
+  judge_temperature(verdict, bar_far_from_reference(found.observations), kBarTemperature,
+                    options.accept_bar_temperature);
+  judge_temperature(verdict, bar_unlike_neighbours(found.observations), kBarTemperatureChange,
+                    options.accept_bar_temperature_change);
   note_scale(verdict, found.observations.bar);
   note_set_aside(verdict, found);
   note_small_residuals(verdict, found.solution.statistics);

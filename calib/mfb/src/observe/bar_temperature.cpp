@@ -36,18 +36,23 @@ std::vector<const PassObservation*> first_passes(const Observations& o) {
   return first;
 }
 
-/// From the mean of the temperatures before and after; at the ends from the only neighbour.
-double from_neighbours_K(const std::vector<const PassObservation*>& passes, std::size_t i) {
-  double sum_K = 0.0, count = 0.0;
-  if (i > 0) {
-    sum_K += passes[i - 1]->temperature_K;
-    count += 1.0;
+/// The smaller of two differences of the same sign; 0 if their signs differ.
+double common_K(double a_K, double b_K) {
+  return a_K * b_K > 0.0 ? std::copysign(std::min(std::abs(a_K), std::abs(b_K)), a_K) : 0.0;
+}
+
+/// From the positions before and after, or at the ends from the next two, if these agree: a bar that
+/// warms up, or that was warmer from one position on, differs from one side only.
+double unlike_neighbours_K(const std::vector<const PassObservation*>& passes, std::size_t i,
+                           double most_K) {
+  const auto at_K = [&](std::size_t k) { return passes[k]->temperature_K; };
+  const std::size_t last = passes.size() - 1;
+  const bool end = i == 0 || i == last;
+  const std::size_t one = i == 0 ? 1 : i - 1, other = i == 0 ? 2 : i == last ? i - 2 : i + 1;
+  if (end && std::abs(at_K(one) - at_K(other)) > most_K) {
+    return 0.0;
   }
-  if (i + 1 < passes.size()) {
-    sum_K += passes[i + 1]->temperature_K;
-    count += 1.0;
-  }
-  return passes[i]->temperature_K - sum_K / count;
+  return common_K(at_K(i) - at_K(one), at_K(i) - at_K(other));
 }
 
 }  // namespace
@@ -72,8 +77,8 @@ std::optional<std::string> bar_unlike_neighbours(const Observations& o) {
   const double most_K = kMostBetweenPositions_K + kSureOfTemperature * o.plan.noise.u_temperature_K;
   std::size_t worst = 0;
   double worst_K = 0.0;
-  for (std::size_t i = 0; passes.size() > 1 && i < passes.size(); ++i) {
-    const double off_K = from_neighbours_K(passes, i);
+  for (std::size_t i = 0; passes.size() > 2 && i < passes.size(); ++i) {
+    const double off_K = unlike_neighbours_K(passes, i, most_K);
     if (std::abs(off_K) > std::abs(worst_K)) {
       worst = i;
       worst_K = off_K;
@@ -84,7 +89,7 @@ std::optional<std::string> bar_unlike_neighbours(const Observations& o) {
   }
   return message(o.plan.measurements[passes[worst]->measurement].name,
                  ": the temperature of the bar is ", celsius(passes[worst]->temperature_K), " C, ",
-                 std::abs(worst_K), " K from that of the positions before and after it",
+                 std::abs(worst_K), " K from that of the positions next to it",
                  effect_on_lengths(o.bar, "its", worst_K));
 }
 

@@ -69,7 +69,9 @@ Result<void> check_shown(const Observations& o, const Solution& solution,
       ErrorCode::RankDeficient,
       message("identification: the positions of the bar do not show ", list, "; at most ",
               options.most_u_m * kUmPerM, " um and ", options.most_u_rad * kUmPerM, " urad: ",
-              far ? message(*far, "; check temperature_C, in degrees Celsius")
+              far ? message(*far,
+                            "; check temperature_C, in degrees Celsius, or measure in "
+                            "further positions")
                   : "measure in further positions"));
 }
 

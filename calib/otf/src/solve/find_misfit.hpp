@@ -1,5 +1,5 @@
 #pragma once
-/// Misfit of runs on the fly (abbe/calib/misfit.hpp), found from their residuals.
+/// Misfit of runs on the fly (abbe/calib/model/misfit.hpp), found from their residuals.
 ///
 /// Noise of legs that are far apart in time is independent, but what the model cannot represent is
 /// the same whenever a leg comes to the same place. The travel of an axis is divided into sections,

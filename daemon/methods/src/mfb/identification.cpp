@@ -28,10 +28,12 @@ Result<MfbCandidate> identify_with_bar(const MfbTask& task, const Config& config
                 found.error().text + mfb::corrections_to_plan(task.bar, task.plan, task.passes));
 
   show("judging", 0.0);
-  auto verdict = mfb::judge(*found, active,
-                            {.limits = gate_limits(config.gate),
-                             .solve = task.options.solve,
-                             .accept_bar_temperature = config.gate.accepts(mfb::kBarTemperature)});
+  auto verdict = mfb::judge(
+      *found, active,
+      {.limits = gate_limits(config.gate),
+       .solve = task.options.solve,
+       .accept_bar_temperature = config.gate.accepts(mfb::kBarTemperature),
+       .accept_bar_temperature_change = config.gate.accepts(mfb::kBarTemperatureChange)});
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   for (std::string& note : notes_on_inputs(task.bar, task.plan, config.machine))
     verdict->notes.push_back(std::move(note));

@@ -212,7 +212,8 @@ struct GateConfig {
   /// - "smaller-volume": a model whose validity volume is smaller than that of the active model;
   /// - "scale-change": a model whose scale differs from that of the active model;
   /// - "path-orientation": a path file that may be rotated;
-  /// - "bar-temperature": a bar more than 12 K from 20 C.
+  /// - "bar-temperature": a bar more than 12 K from 20 C;
+  /// - "bar-temperature-change": a bar warmer or colder at a position than at those next to it.
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;

@@ -23,8 +23,7 @@
 /// - A sample without content: an instance is disposed or unregistered. Fast DDS aborts if it
 ///   cannot find its key. abbe's subscribers do not need such samples; the filter replaces them by
 ///   a GAP, so that a reliable reader does not wait for them. Key hashes are blanked: Fast DDS then
-///   reads the key from the content.
-///   So are samples of another encapsulation than plain CDR.
+///   reads the key from the content. So are samples of another encapsulation than plain CDR.
 /// - Fragments of samples, which Fast DDS checks insufficiently. A message of abbe fits into one
 ///   datagram, so the filter skips those of users' writers.
 /// - A GAP of more numbers than any history covers, which Fast DDS marks one by one; GAPs and

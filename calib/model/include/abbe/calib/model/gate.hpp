@@ -83,7 +83,7 @@ struct Verdict {
   /// Machine-readable identifiers of `reasons`, one each in the same order: the name of a Cause of
   /// the method's lack_of_fit.hpp, or one of held-out, nowhere, size, slope, volume, scale-change,
   /// growth, uncertainty, orientation, outliers, shape-only, damage,
-  /// bar-temperature, beams.
+  /// bar-temperature, bar-temperature-change, beams.
   std::vector<std::string> causes;
   std::vector<std::string> notes;  ///< further information, no reason to refuse
   HeldOutFigures held_out;

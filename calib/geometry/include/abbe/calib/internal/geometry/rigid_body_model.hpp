@@ -1,7 +1,7 @@
 #pragma once
 /// The linear rigid-body model V = M B U of a machine with three linear axes ([Sanders 2023]
 /// eq. (6) and its reference 14). U: parameters (parameter_layout.hpp), B U: errors of the axes
-/// interpolated between nodes (basis.hpp), M: their effect on the target. That is
+/// interpolated between nodes (linear_interpolation.hpp), M: their effect on the target. That is
 ///     V(q) = sum_a [ d_a(q_a) + eps_a(q_a) x l_a(q) ] + (-EC0Y (y - y0) + EB0Z (z - z0),
 ///                                                        -EA0Z (z - z0), 0)
 ///     l_a(q) = t + sum of q_b e_b over the axes b nearer to the tool than a

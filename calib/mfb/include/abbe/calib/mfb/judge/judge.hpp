@@ -7,8 +7,8 @@
 /// is the deviation of the group g from its prediction, without a second adjustment. Unknowns of
 /// the passes (pose, tool, drift) and of the bar belong to every compared model: no compensation
 /// has no others, and the active model enters as y - (its errors at the touches). A group that the
-/// others do not predict to ten times the noise of its points is not left out. Units: m, rad; k =
-/// 1. Pure.
+/// others do not predict to ten times the noise of its points is not left out. Units: m,
+/// rad; k = 1. Pure.
 
 #include <string_view>
 
@@ -17,14 +17,17 @@
 
 namespace abbe::calib::mfb {
 
-/// Entry in the configuration that permits a bar more than kMostFromReference_K from 20 C, and one
-/// that was warmer or colder at a position than before and after it (kMostBetweenPositions_K).
+/// Entry in the configuration that permits a bar more than kMostFromReference_K from 20 C.
 inline constexpr std::string_view kBarTemperature = "bar-temperature";
+/// The same for one that was warmer or colder at a position than at those next to it
+/// (kMostBetweenPositions_K).
+inline constexpr std::string_view kBarTemperatureChange = "bar-temperature-change";
 
 struct JudgeOptions {
   GateLimits limits{};
   SolveOptions solve{};
-  bool accept_bar_temperature = false;  ///< see kBarTemperature
+  bool accept_bar_temperature = false;         ///< see kBarTemperature
+  bool accept_bar_temperature_change = false;  ///< see kBarTemperatureChange
 };
 
 /// `active`, the model in use, may be null. It is compared at the points inside its validity

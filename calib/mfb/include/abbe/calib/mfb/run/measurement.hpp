@@ -38,8 +38,8 @@ struct Measurement {
 /// A bar farther from 20 C is asked for by name: degrees Fahrenheit and typing errors are no
 /// temperatures of a workshop, and residuals show no wrong one.
 inline constexpr double kMostFromReference_K = 12.0;
-/// A position is asked for by name if the bar was warmer or colder there than before and after by
-/// more than this and three times the uncertainty of its temperature.
+/// A position is asked for by name if the bar was warmer, or colder, there than at both positions
+/// next to it in time by more than this and three times the uncertainty of its temperature.
 inline constexpr double kMostBetweenPositions_K = 1.0;
 
 /// Standard uncertainties (k = 1).

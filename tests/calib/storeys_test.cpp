@@ -1,5 +1,5 @@
-// The tables of storeys and of rooms in calib/README.md against what files include and CMakeLists.txt
-// links.
+// The tables of storeys and of rooms in calib/README.md against what files include and
+// CMakeLists.txt links.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -34,9 +34,9 @@ calib::mfb::Plan random_plan(std::mt19937_64& random) {
   return plan;
 }
 
-/// The bar is a few kelvin from 20 degC, warms up or cools down, and one session in three goes on the
-/// next morning at another temperature. Its thermometer, and the temperature at each position, are
-/// wrong by errors of the stated uncertainty.
+/// The bar is a few kelvin from 20 degC, warms up or cools down, and one session in three goes on
+/// the next morning at another temperature. Its thermometer, and the temperature at each position,
+/// are wrong by errors of the stated uncertainty.
 void measure_temperature(MfbRun& run) {
   std::mt19937_64& random = run.random;
   run.probing.expansion = calib::Expansivity{11.5e-6, uniform(random, 0.1e-6, 0.8e-6)};

@@ -1,5 +1,6 @@
 #pragma once
-/// Misfit of a ball array (abbe/calib/model/misfit.hpp), found from the scatter of the ball centres.
+/// Misfit of a ball array (abbe/calib/model/misfit.hpp), found from the scatter of the ball
+/// centres.
 
 #include <optional>
 

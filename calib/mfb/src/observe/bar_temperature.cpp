@@ -41,8 +41,8 @@ double common_K(double a_K, double b_K) {
   return a_K * b_K > 0.0 ? std::copysign(std::min(std::abs(a_K), std::abs(b_K)), a_K) : 0.0;
 }
 
-/// From the positions before and after, or at the ends from the next two, if these agree: a bar that
-/// warms up, or that was warmer from one position on, differs from one side only.
+/// From the positions before and after, or at the ends from the next two, if these agree: a bar
+/// that warms up, or that was warmer from one position on, differs from one side only.
 double unlike_neighbours_K(const std::vector<const PassObservation*>& passes, std::size_t i,
                            double most_K) {
   const auto at_K = [&](std::size_t k) { return passes[k]->temperature_K; };

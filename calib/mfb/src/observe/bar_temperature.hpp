@@ -15,9 +15,9 @@ namespace abbe::calib::mfb {
 
 /// "X1: the temperature of the bar is 25.1 C, 4.2 K from that of the positions next to it: its
 /// lengths change by 48 um/m", of the position that differs most; nullopt: none differs from both
-/// positions next to it in time in the same direction by more than kMostBetweenPositions_K and three
-/// times the uncertainty of its temperature. At the ends it is compared with the next two, if these
-/// agree.
+/// positions next to it in time in the same direction by more than kMostBetweenPositions_K and
+/// three times the uncertainty of its temperature. At the ends it is compared with the next two, if
+/// these agree.
 [[nodiscard]] std::optional<std::string> bar_unlike_neighbours(const Observations&);
 
 }  // namespace abbe::calib::mfb

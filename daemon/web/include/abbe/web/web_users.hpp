@@ -37,8 +37,8 @@ struct WebUser {
 [[nodiscard]] daemon::Result<std::vector<WebUser>> read_web_users(
     const std::filesystem::path& file);
 
-/// The file, read again when it changes. While it has a fault, the users of the last good file stay:
-/// a slip of the pen must not log out everybody. Thread-safe.
+/// The file, read again when it changes. While it has a fault, the users of the last good file
+/// stay: a slip of the pen must not log out everybody. Thread-safe.
 class UsersFile {
  public:
   using Users = std::shared_ptr<const std::vector<WebUser>>;

@@ -8,9 +8,9 @@
 ///    C = (H + prior)^-1; A: weighted rows of the leg; G: see plan_prediction.hpp. The gain is the
 ///    decrease of trace(G C) by the leg. H: information of the walk so far, and of the length that
 ///    is left as if it were distributed over all legs in the best way.
-/// 2. Exchange: vertices are inserted, removed or moved, or a part is reversed, while this decreases
-///    trace(G C) times length (noise decreases with the root of the length, so that this product
-///    compares paths of different lengths).
+/// 2. Exchange: vertices are inserted, removed or moved, or a part is reversed, while this
+///    decreases trace(G C) times length (noise decreases with the root of the length, so that this
+///    product compares paths of different lengths).
 /// 3. Descent: vertices leave the lattice along the gradient of trace(G C), at constant length.
 ///
 /// A path of edges and full diagonals alone hardly shows a common-mode positioning error; oblique

@@ -6,8 +6,8 @@
 /// c = x, y, z; middle_a, half_a: of the travel, so that D is the error at a corner. D is a random
 /// effect N(0, s^2). s is that of the largest marginal likelihood; D counts as zero if this
 /// likelihood does not exceed that of s = 0 beyond chance. The model does not contain these errors:
-/// they are misfit (abbe/calib/model/misfit.hpp). They are not searched for in runs with reference nests,
-/// whose drift would follow them, nor in runs with several targets.
+/// they are misfit (abbe/calib/model/misfit.hpp). They are not searched for in runs with reference
+/// nests, whose drift would follow them, nor in runs with several targets.
 
 #include <array>
 

@@ -10,8 +10,6 @@
 namespace abbe::tests::never_worse {
 namespace {
 
-using Errors = std::function<Vector3(const Vector3& q_m)>;
-
 /// With which the 21 errors are determined with the fewest passes.
 const std::set<std::string> kFewest{"X1",  "X2",  "X3",  "Y1",   "Y2",   "Y3+",
                                     "Z1+", "Z1-", "Z2+", "DXY1", "DXZ1", "DYZ1"};
@@ -217,8 +215,7 @@ std::vector<Fault<MfbRun>> mfb_faults() {
   // What moves or bends a bar in one pass is an error of this measurement; in all, a drift.
   const Names pass{{"measurement", "drift", "outliers"}}, hole{{"hole"}},
       drifts{{"drift", "measurement"}},
-      readings{{}, {"the readings fit the plan with", " fit measurement "}},
-      turned{{}, {"lies turned"}};
+      readings{{}, {"the readings fit the plan with", " fit measurement "}};
   return {
       {"none", [](MfbRun&) {}, {}},
       {"bar shifted by 5..50 um within a pass",

@@ -27,7 +27,7 @@ const StoreEvent* drift_of(std::span<const StoreEvent> events) {
 }
 
 /// A model that was not judged is not refused: files of earlier versions stay usable, and what is
-/// made of them states that nobody judged them. `abbe model activate` does refuse it, because a
+/// made of them states that they were not judged. `abbe model activate` does refuse it, because a
 /// store has the verdict of every model that abbe added.
 void add_verdict(const ModelInUse& use, Obstacles& out) {
   const auto& verdict = use.document.verdict;
@@ -43,7 +43,7 @@ bool accepted_for(std::span<const StoreEvent> events, const std::string& machine
   return last != events.rend() && last->accepted_configuration == machine_hash;
 }
 
-/// Nobody signs a certificate of a machine that does not exist. A control file of such a model may
+/// A certificate is for a machine that exists. A control file of a model of simulated devices may
 /// be for a simulated control; it states where the model comes from.
 void add_simulated(const ModelInUse& use, Obstacles& out) {
   if (!made_on_simulated_devices(use.document).value_or(false)) return;

@@ -118,7 +118,7 @@ class Health {
 };
 
 /// Until SIGTERM or SIGINT, or until the page cannot serve. Feeds the watchdog of systemd as long
-/// as the page is served: then systemd starts a page anew that cannot be reached.
+/// as the page is served: systemd restarts abbe-web if the page cannot be reached.
 int run_until_stop(const sigset_t& stop, const abbe::web::PageServer& page) {
   const bool watched = abbe::daemon::watchdog_period().has_value();
   const timespec period{.tv_sec = 1, .tv_nsec = 0};

@@ -17,6 +17,7 @@
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
 #include "judge/alternative_columns.hpp"
+#include "run/sparse_grid.hpp"
 #include "solve/added_columns.hpp"
 
 namespace abbe::calib::otf {
@@ -28,26 +29,12 @@ constexpr double kCauses = 10.0;
 /// Other design matrices are tested only above this variance factor, because each test takes the
 /// time of an adjustment.
 constexpr double kSuspicious = 2.0;
+constexpr std::size_t kGridCells = 8;  // per axis, of the places at which V is compared
 
-/// Grid of at most about 9 nodes per axis, including both ends.
-std::vector<Vector3> sparse_grid(const MachineNodes& nodes) {
-  constexpr std::size_t kCells = 8;
-  MachineNodes few;
-  for (const Axis a : kAllAxes) {
-    const std::vector<double>& all = nodes[index(a)].nodes_m;
-    const std::size_t step = std::max<std::size_t>(1, (all.size() - 1 + kCells - 1) / kCells);
-    for (std::size_t i = 0; i + 1 < all.size(); i += step) {
-      few[index(a)].nodes_m.push_back(all[i]);
-    }
-    few[index(a)].nodes_m.push_back(all.back());
-  }
-  return tensor_grid(few);
-}
-
-/// Norm for the parameters U of tables, evaluated on sparse_grid(): at its nodes, linear and cubic
+/// Norm for the parameters U of tables, evaluated at some nodes: there, linear and cubic
 /// tables have the same V.
 RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
-  const std::vector<Vector3> at = sparse_grid(layout.nodes());
+  const std::vector<Vector3> at = sparse_grid(layout.nodes(), kGridCells);
   Eigen::MatrixXd D =
       Eigen::MatrixXd::Zero(3 * std::ssize(at), static_cast<Eigen::Index>(layout.model_size()));
   std::vector<Vector3> points;
@@ -230,7 +217,7 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
 
   std::vector<Vector3> points, difference;
   const Vector3& t = fit.o.target_offset_m;
-  for (const Vector3& q : sparse_grid(other.layout().nodes())) {
+  for (const Vector3& q : sparse_grid(other.layout().nodes(), kGridCells)) {
     points.push_back(q + t);
     difference.push_back(
         solution.model.V_at(q, t) -
@@ -335,7 +322,8 @@ std::vector<decltype(&closer_nodes)> other_designs(Tables tables) {
 CorrectionSize correction_size(const VolumetricModel& model) {
   const RigidFreeNorm norm =
       rigid_free_norm(model.tables()->layout(), model.tool_offsets_m().front());
-  const double of_misfit_m = std::sqrt(mean_misfit_m2(model, sparse_grid(model.nodes())));
+  const double of_misfit_m =
+      std::sqrt(mean_misfit_m2(model, sparse_grid(model.nodes(), kGridCells)));
   return {norm.rms_m(model.U()),
           root_sum_of_squares(norm.rms_u_m(model.covariance()), of_misfit_m)};
 }

@@ -7,26 +7,13 @@
 
 #include "abbe/calib/internal/geometry/rigid_body_model.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
+#include "run/sparse_grid.hpp"
 
 namespace abbe::calib::otf {
 namespace {
 
+constexpr std::size_t kVolumeCells = 12;  // per axis
 using RigidColumns = Eigen::Matrix<double, 3, 6>;
-
-/// Every n-th node, with both ends, so that an axis has at most about 13.
-std::vector<Vector3> grid_of_nodes(const MachineNodes& nodes) {
-  constexpr std::size_t kCells = 12;
-  MachineNodes few;
-  for (const Axis a : kAllAxes) {
-    const std::vector<double>& all = nodes[index(a)].nodes_m;
-    const std::size_t step = std::max<std::size_t>(1, (all.size() - 1 + kCells - 1) / kCells);
-    for (std::size_t i = 0; i + 1 < all.size(); i += step) {
-      few[index(a)].nodes_m.push_back(all[i]);
-    }
-    few[index(a)].nodes_m.push_back(all.back());
-  }
-  return tensor_grid(few);
-}
 
 RigidColumns rigid_columns(const Vector3& from_centre_m) {
   RigidColumns E;
@@ -38,7 +25,7 @@ RigidColumns rigid_columns(const Vector3& from_centre_m) {
 
 RigidFreeVolume::RigidFreeVolume(const ParameterLayout& layout, const Vector3& t)
     : layout_(layout), t_(t) {
-  const std::vector<Vector3> grid = grid_of_nodes(layout.nodes());
+  const std::vector<Vector3> grid = sparse_grid(layout.nodes(), kVolumeCells);
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   const auto places = static_cast<double>(grid.size());
   for (const Vector3& q : grid) {

@@ -7,14 +7,12 @@
 #include <string_view>
 #include <utility>
 
-#include "abbe/calib/model/volumetric_model.hpp"
-
 namespace abbe::linuxcnc {
 namespace {
 
 constexpr double kMillimetre = 1e-3;
 
-using Vector = calib::Vector3;
+using Vector = Eigen::Vector3d;
 
 Vector from_mm(const double (&v_mm)[3]) {
   return Vector(v_mm[0], v_mm[1], v_mm[2]) * kMillimetre;
@@ -32,7 +30,7 @@ abbe_wanted refuse(fmt::format_string<Values...> reason, Values&&... values) {
 /// As VolumetricModel::holds_for_tool() of a model for one tool: what is published does not show
 /// whether a model holds for more tools. An offset that is NaN refuses, too.
 bool holds_for(const Vector& tool_m, const Usable& usable) {
-  return (tool_m - usable.tool_offset_m).norm() <= calib::VolumetricModel::kToolTolerance_m;
+  return (tool_m - usable.tool_offset_m).norm() <= kToolTolerance_m;
 }
 
 abbe_wanted refuse_tool(const Vector& tool_m, int number, const Usable& usable) {
@@ -45,15 +43,15 @@ abbe_wanted refuse_tool(const Vector& tool_m, int number, const Usable& usable) 
 
 }  // namespace
 
-std::optional<calib::Vector3> command_correction(const calib::ErrorLattice& field,
-                                                 const calib::Vector3& position_m) {
+std::optional<Eigen::Vector3d> command_correction(const daemon::ErrorLattice& field,
+                                                 const Eigen::Vector3d& position_m) {
   // Each pass multiplies the remaining error by the slope of V, 1e-3 at most: three give 1e-9 of c.
   constexpr int kPasses = 3;
   if (!position_m.allFinite()) return std::nullopt;
 
-  calib::Vector3 correction_m = calib::Vector3::Zero();
+  Eigen::Vector3d correction_m = Eigen::Vector3d::Zero();
   for (int pass = 0; pass < kPasses; ++pass) {
-    calib::Vector3 V_m;
+    Eigen::Vector3d V_m;
     if (!field.at(position_m + correction_m, V_m)) return std::nullopt;
     correction_m = -V_m;
   }

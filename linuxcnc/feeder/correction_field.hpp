@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/calib/model/error_lattice.hpp"
+#include "abbe/messages/error_lattice.hpp"
 #include "hand_over.h"
 
 namespace abbe::linuxcnc {
@@ -15,15 +15,19 @@ namespace abbe::linuxcnc {
 /// from the grid of V. p: joint positions as LinuxCNC shows them, which must be abbe's axis
 /// positions. Lengths in m.
 /// nullopt if p + c is not in a cell of the grid of which every corner is inside the volume.
-[[nodiscard]] std::optional<calib::Vector3> command_correction(const calib::ErrorLattice& field,
-                                                               const calib::Vector3& position_m);
+[[nodiscard]] std::optional<Eigen::Vector3d> command_correction(const daemon::ErrorLattice& field,
+                                                               const Eigen::Vector3d& position_m);
+
+/// A model for one tool is applied to tools whose offset differs by at most this, as in abbe
+/// (VolumetricModel::holds_for_tool).
+inline constexpr double kToolTolerance_m = 0.5e-3;
 
 /// What the subscription passes to the loop of the feeder.
 struct Usable {
-  std::optional<calib::ErrorLattice> field;  ///< nullopt: nothing may be applied, see reason
+  std::optional<daemon::ErrorLattice> field;  ///< nullopt: nothing may be applied, see reason
   std::string reason = {};
   std::string model_id = {};
-  calib::Vector3 tool_offset_m = calib::Vector3::Zero();  ///< for which V of the field holds
+  Eigen::Vector3d tool_offset_m = Eigen::Vector3d::Zero();  ///< for which V of the field holds
   /// False: the publisher, an abbe-dds of an earlier version, is used by the name of the machine.
   bool identified = true;
 };
@@ -34,7 +38,7 @@ struct FeedOptions {
   /// abbe's tool offset (tool reference point to functional point) while motion.tooloffset is 0.
   /// That of any tool is this minus motion.tooloffset: LinuxCNC subtracts its offset from the
   /// position of the tool reference point to show that of the functional point.
-  calib::Vector3 tool_offset_at_zero_m = calib::Vector3::Zero();
+  Eigen::Vector3d tool_offset_at_zero_m = Eigen::Vector3d::Zero();
 };
 
 /// Decision for one cycle: the values for the realtime component, with a reason if not valid.

@@ -45,7 +45,7 @@ std::shared_ptr<const Usable> Subscription::poll(std::chrono::milliseconds at_mo
   usable_ = std::make_shared<const Usable>(
       lattice ? Usable{.field = std::move(*lattice),
                        .model_id = id,
-                       .tool_offset_m = calib::Vector3(t[0], t[1], t[2]),
+                       .tool_offset_m = Eigen::Vector3d(t[0], t[1], t[2]),
                        .identified = pin_.machine_id().has_value()}
               : Usable{.field = {}, .reason = lattice.error().text});
   return usable_;

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/calib/model/error_lattice.hpp"
+#include "abbe/messages/error_lattice.hpp"
 #include "abbe/dds/publisher_pin.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"

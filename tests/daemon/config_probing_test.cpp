@@ -71,8 +71,8 @@ TEST(ConfigDds, RunsAbbeDdsAsAUnitUnderSystemd) {
   auto unit = parse_config(kMachine, "abbed.toml");
   ASSERT_TRUE(unit);
   auto child = *unit;
-  use_dds_unit(*unit, true);
-  use_dds_unit(child, false);
+  use_dds_unit(unit->dds, unit->daemon.runtime_dir, true);
+  use_dds_unit(child.dds, child.daemon.runtime_dir, false);
   EXPECT_EQ(unit->dds.supervise, Supervise::Systemd);
   EXPECT_EQ(unit->dds.socket, "/run/abbe-dds/dds.sock");
   EXPECT_EQ(child.dds.supervise, Supervise::Child);
@@ -83,7 +83,7 @@ TEST(ConfigDds, AnExplicitChoiceStays) {
   auto config = parse_config(
       kMachine + "[dds]\nsupervise = \"child\"\nsocket = \"/run/x/dds.sock\"\n", "abbed.toml");
   ASSERT_TRUE(config);
-  use_dds_unit(*config, true);
+  use_dds_unit(config->dds, config->daemon.runtime_dir, true);
   EXPECT_EQ(config->dds.supervise, Supervise::Child);
   EXPECT_EQ(config->dds.socket, "/run/x/dds.sock");
 }

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "abbe/config/bounded_toml.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "abbe/config/config.hpp"
 
 namespace {

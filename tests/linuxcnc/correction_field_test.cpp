@@ -9,13 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/calib/model/volumetric_model.hpp"
 #include "allocation_count.hpp"
 
 namespace {
 
-using abbe::calib::ErrorLattice;
-using abbe::calib::LatticeNode;
-using abbe::calib::Vector3;
+using abbe::daemon::ErrorLattice;
+using abbe::daemon::LatticeNode;
+using Eigen::Vector3d;
 using abbe::linuxcnc::command_correction;
 using abbe::linuxcnc::FeedOptions;
 using abbe::linuxcnc::Usable;
@@ -23,7 +24,7 @@ using abbe::linuxcnc::Usable;
 constexpr double kNode_m = 0.1;
 
 /// V of the grid: linear, so that the interpolation is exact.
-Vector3 V_at(const Vector3& q_m) {
+Vector3d V_at(const Vector3d& q_m) {
   return {2e-5 + 1e-4 * q_m.x() - 2e-4 * q_m.y(), -3e-5 + 1e-4 * q_m.z(), 1e-4 * q_m.x()};
 }
 
@@ -31,21 +32,21 @@ Vector3 V_at(const Vector3& q_m) {
 ErrorLattice grid() {
   std::vector<LatticeNode> nodes;
   for (int i = 0; i < 27; ++i) {
-    const Vector3 p_m = kNode_m * Vector3(i / 9, i / 3 % 3, i % 3);
+    const Vector3d p_m = kNode_m * Vector3d(i / 9, i / 3 % 3, i % 3);
     nodes.push_back({p_m, V_at(p_m), i != 26});
   }
   return ErrorLattice::create(nodes).value();
 }
 
-const Vector3 kPlace_m(0.03, 0.12, 0.07);
-const Vector3 kModelTool_m(0.02, -0.015, -0.12);
+const Vector3d kPlace_m(0.03, 0.12, 0.07);
+const Vector3d kModelTool_m(0.02, -0.015, -0.12);
 
 Usable usable() {
   return {grid(), {}, "m", kModelTool_m};
 }
 
 /// LinuxCNC at a place, with the tool of the model: its offset has the opposite sign.
-abbe_control control(const Vector3& place_m = kPlace_m) {
+abbe_control control(const Vector3d& place_m = kPlace_m) {
   abbe_control c{};
   for (int i = 0; i < 3; ++i) {
     c.position[i] = 1e3 * place_m[i];
@@ -70,14 +71,14 @@ abbe_wanted wanted_of(const abbe_control& c, const FeedOptions& options = {}) {
 TEST(CommandCorrection, TheToolIsAtTheCommandedPosition) {
   const auto c_m = command_correction(grid(), kPlace_m);
   ASSERT_TRUE(c_m);
-  const Vector3 reading_m = kPlace_m + *c_m;
+  const Vector3d reading_m = kPlace_m + *c_m;
   EXPECT_LT((reading_m + V_at(reading_m) - kPlace_m).norm(), 1e-12);
 }
 
 TEST(CommandCorrection, NothingOutsideTheVolume) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const Vector3& p_m : {Vector3(-0.01, 0.1, 0.1), Vector3(0.1, 0.1, 0.21),
-                             Vector3(0.15, 0.15, 0.15), Vector3(nan, 0.1, 0.1)}) {
+  for (const Vector3d& p_m : {Vector3d(-0.01, 0.1, 0.1), Vector3d(0.1, 0.1, 0.21),
+                             Vector3d(0.15, 0.15, 0.15), Vector3d(nan, 0.1, 0.1)}) {
     EXPECT_FALSE(command_correction(grid(), p_m)) << p_m.transpose();
   }
 }
@@ -85,8 +86,12 @@ TEST(CommandCorrection, NothingOutsideTheVolume) {
 TEST(Wanted, IsTheCorrectionIfEverythingIsRight) {
   const auto w = wanted_of(control());
   EXPECT_TRUE(w.valid) << w.reason;
-  const Vector3 c_m = *command_correction(grid(), kPlace_m);
+  const Vector3d c_m = *command_correction(grid(), kPlace_m);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(w.correction[i], 1e3 * c_m[i], 1e-12);
+}
+
+TEST(Wanted, HasTheTolerancesOfAbbe) {
+  EXPECT_EQ(abbe::linuxcnc::kToolTolerance_m, abbe::calib::VolumetricModel::kToolTolerance_m);
 }
 
 TEST(Wanted, FollowsTheToolInTheSpindle) {
@@ -125,7 +130,7 @@ TEST(Wanted, EveryRefusalHasAReasonAndIsZero) {
       {wanted_of(with_tool(3, nan)),
        "the model is for the tool offset (20.000, -15.000, -120.000) mm, T3 has "
        "(20.000, -15.000, nan) mm"},
-      {wanted_of(control(Vector3(0.5, 0.0, 0.0))), "outside the volume of the model"},
+      {wanted_of(control(Vector3d(0.5, 0.0, 0.0))), "outside the volume of the model"},
       {wanted_of(control(), narrow), "the correction is larger than the clamp"},
       {wanted_of(control(), unusable), "the correction is larger than the clamp"}};
   for (const auto& [refusal, reason] : refusals) {

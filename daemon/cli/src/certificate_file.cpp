@@ -1,8 +1,8 @@
 #include "certificate_file.hpp"
 
 #include "abbe/base/text_file.hpp"
-#include "abbe/config/bounded_toml.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/bounded_toml.hpp"
+#include "abbe/settings/section.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "abbe/config/config.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 #include "classified_section.hpp"
 
 namespace abbe::daemon {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "abbe/base/units.hpp"
-#include "abbe/config/bounded_toml.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "config_kind.hpp"
 #include "readers.hpp"
 

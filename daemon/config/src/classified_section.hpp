@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "abbe/config/meaning.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 
 namespace abbe::daemon {
 

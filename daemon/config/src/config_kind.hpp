@@ -11,7 +11,7 @@
 
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/config.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 #include "classified_section.hpp"
 #include "stream_names.hpp"
 

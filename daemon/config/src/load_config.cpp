@@ -1,12 +1,6 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <sstream>
 
-#include "abbe/config/bounded_toml.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "config_kind.hpp"
 #include "readers.hpp"
 
@@ -24,7 +18,7 @@ Config read_all(const Section& file, const std::filesystem::path& base) {
   read_sensors(root, config);
   read_recording(root, base, config);
   read_models(root, config.models);
-  read_dds(root, base, config);
+  read_participant(root, base, config);
   read_gate(root, config);
   read_otf(root, config.otf);
   read_drift(root, config);
@@ -39,15 +33,6 @@ Config read_all(const Section& file, const std::filesystem::path& base) {
   root.close();
 
   return config;
-}
-
-Result<std::string> read_configuration_text(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
-  if (in.bad() || !in.is_open())
-    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
-  return text.str();
 }
 
 namespace {

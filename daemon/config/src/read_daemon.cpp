@@ -38,22 +38,7 @@ void read_scheduling(ClassifiedSection& section, DaemonConfig& out) {
     out.cpu_latency = std::chrono::microseconds{us};
 }
 
-/// abbe-dds as a unit has a user of its own, which cannot enter the folder of the control socket.
-std::filesystem::path default_dds_socket(const DaemonConfig& daemon, Supervise supervise) {
-  auto folder = daemon.runtime_dir;
-  if (supervise == Supervise::Systemd) folder += "-dds";
-  return folder / "dds.sock";
-}
-
 }  // namespace
-
-void use_dds_unit(Config& config, bool unit) {
-  DdsConfig& dds = config.dds;
-  if (dds.supervise != Supervise::ByStart) return;
-  const bool by_default = dds.socket == default_dds_socket(config.daemon, dds.supervise);
-  dds.supervise = unit ? Supervise::Systemd : Supervise::Child;
-  if (by_default) dds.socket = default_dds_socket(config.daemon, dds.supervise);
-}
 
 void read_daemon(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
   ClassifiedSection section = root.child("daemon");
@@ -110,31 +95,14 @@ void read_models(ClassifiedSection& root, ModelRetention& out) {
   section.close();
 }
 
-void read_dds(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
+void read_participant(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
   Section section = root.operation_table("dds");
-  auto& dds = out.dds;
-  // The domain ids 0 to 232 give valid UDP port numbers [DDSI-RTPS 2.2, 9.6.1.1].
-  section.get_integer("domain", dds.domain, 0, 232);
-
-  // A rate of 0 means: a sample with every hub cycle that has new data. The hub period and the
-  // rates of the devices then limit the rate.
-  section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
-  section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
-  section.get_integer("priority", dds.priority, 0, 99);
-  if (dds.priority >= out.daemon.hub_priority)
+  read_dds(section, base, out.daemon.runtime_dir, out.dds);
+  if (out.dds.priority >= out.daemon.hub_priority)
     section.fault("priority",
                   fmt::format("must be below [daemon] hub_priority {}: otherwise a busy DDS "
                               "participant delays the hub",
                               out.daemon.hub_priority));
-  section.get("validity_s", dds.validity, kPlain, {0.01, 3600.0});
-  section.get_word<Supervise>(
-      "supervise", dds.supervise,
-      {{"child", Supervise::Child}, {"systemd", Supervise::Systemd}, {"off", Supervise::Off}});
-  section.get("profile", dds.profile, base);
-  section.get("security", dds.security, base);
-  section.get_maybe_empty("user", dds.user);
-  section.get("socket", dds.socket, base);
-  if (dds.socket.empty()) dds.socket = default_dds_socket(out.daemon, dds.supervise);
   section.close();
 }
 

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "abbe/config/bounded_toml.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 #include <netinet/in.h>
 
-#include "abbe/config/bounded_toml.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {

@@ -4,18 +4,13 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/mtconnect_config.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 #include "abbe/config/web_config.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "classified_section.hpp"
 
 namespace abbe::daemon {
 
-/// A file that a person wrote has fewer faults than this; the limit shortens the list for a file
-/// that is not a configuration at all.
-inline constexpr std::size_t kMostConfigFaults = 1000;
-
-/// Io if the file cannot be read.
-[[nodiscard]] Result<std::string> read_configuration_text(const std::filesystem::path& file);
 /// All tables. `base`: folder of the file, for relative paths.
 [[nodiscard]] Config read_all(const Section& file, const std::filesystem::path& base);
 
@@ -26,7 +21,7 @@ void read_sensors(ClassifiedSection& root, Config& out);
 void read_daemon(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 void read_recording(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 void read_models(ClassifiedSection& root, ModelRetention& out);
-void read_dds(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
+void read_participant(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 void read_gate(ClassifiedSection& root, Config& out);
 void read_otf(ClassifiedSection& root, OtfConfig& out);
 void read_drift(ClassifiedSection& root, Config& out);

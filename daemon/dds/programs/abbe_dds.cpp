@@ -19,13 +19,13 @@
 #include "abbe/base/service_manager.hpp"
 #include "abbe/base/standard_error.hpp"
 #include "abbe/base/text_file.hpp"
-#include "abbe/config/config.hpp"
 #include "abbe/dds/announcer.hpp"
 #include "abbe/dds/interface_watch.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/twin_watch.hpp"
 #include "abbe/dds/writers.hpp"
 #include "abbe/messages/dds_bridge.hpp"
+#include "abbe/settings/dds_config.hpp"
 
 namespace {
 
@@ -94,16 +94,16 @@ void log_source_change(const DdsBridge& bridge, bool& alive) {
 /// The configuration as abbe-dds.service passes it on (LoadCredential=), because the user of
 /// abbe-dds may not read it; else the file itself. Its paths are relative to the folder of `file`
 /// either way.
-abbe::daemon::Result<abbe::daemon::Config> configuration_of(const std::string& file) {
+abbe::daemon::Result<abbe::daemon::ParticipantConfig> configuration_of(const std::string& file) {
   const char* const credentials = std::getenv("CREDENTIALS_DIRECTORY");
   const auto passed_on =
       std::filesystem::path{credentials != nullptr ? credentials : ""} / "abbed.toml";
   std::error_code error;
   if (credentials == nullptr || (!std::filesystem::exists(passed_on, error) && !error))
-    return abbe::daemon::load_config(file);
+    return abbe::daemon::load_participant_config(file);
   const auto text = abbe::daemon::read_regular_file(passed_on);
   if (!text) return tl::make_unexpected(text.error());
-  return abbe::daemon::parse_config(*text, file);
+  return abbe::daemon::parse_participant_config(*text, file);
 }
 
 /// Reads the options from abbed.toml when abbe-dds runs as a systemd service. Refused if [dds]
@@ -111,7 +111,7 @@ abbe::daemon::Result<abbe::daemon::Config> configuration_of(const std::string& f
 abbe::daemon::Result<void> take_from_config(Options& options) {
   auto config = configuration_of(options.config);
   if (!config) return tl::make_unexpected(config.error());
-  abbe::daemon::use_dds_unit(*config, true);
+  abbe::daemon::use_dds_unit(config->dds, config->runtime_dir, true);
   if (config->dds.supervise != abbe::daemon::Supervise::Systemd) {
     return abbe::daemon::fail(ErrorCode::Refused,
                               options.config +

@@ -18,12 +18,13 @@
 #include "abbe/base/known_errors.hpp"
 #include "abbe/base/message.hpp"
 #include "abbe/base/option_values.hpp"
-#include "abbe/config/config.hpp"
 #include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/participant_addresses.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
+#include "abbe/messages/error_lattice.hpp"
+#include "abbe/settings/dds_config.hpp"
 #include "watched_machines.hpp"
 
 namespace {
@@ -94,7 +95,7 @@ int exit_code_of(const Error& error) {
   }
 }
 
-void print_comparison(const Options& options, const calib::FieldComparison& c,
+void print_comparison(const Options& options, const daemon::FieldComparison& c,
                       const std::string& model_id) {
   if (options.show.json) {
     fmt::print(
@@ -108,7 +109,7 @@ void print_comparison(const Options& options, const calib::FieldComparison& c,
     return;
   }
 
-  const auto row = [](const char* what, const calib::VectorStatistics& s) {
+  const auto row = [](const char* what, const daemon::FieldComparison::Lengths& s) {
     fmt::print("  {:<42} mean {:9.3f} um   max {:9.3f} um\n", what, s.mean_m * 1e6, s.max_m * 1e6);
   };
 
@@ -119,8 +120,8 @@ void print_comparison(const Options& options, const calib::FieldComparison& c,
   row("after:  best-fit rigid motion removed", c.after_rigid_free);
 }
 
-std::vector<calib::Vector3> vectors(const std::vector<std::array<double, 3>>& rows) {
-  std::vector<calib::Vector3> out;
+std::vector<Eigen::Vector3d> vectors(const std::vector<std::array<double, 3>>& rows) {
+  std::vector<Eigen::Vector3d> out;
   for (const auto& row : rows) out.emplace_back(row[0], row[1], row[2]);
   return out;
 }
@@ -135,8 +136,8 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
   const auto lattice = dds::lattice_of(*nodes);
   if (!lattice) return tl::make_unexpected(lattice.error());
   const auto comparison =
-      calib::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
-  if (!comparison) return daemon::fail(ErrorCode::DataInsufficient, comparison.error().text);
+      daemon::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
+  if (!comparison) return tl::make_unexpected(comparison.error());
   print_comparison(options, *comparison, model.state()->model_id());
   return {};
 }
@@ -165,7 +166,7 @@ std::filesystem::path subscriber_keys(const std::filesystem::path& daemon_keys) 
 /// Takes the options that the configuration file defines. --security on the command line takes
 /// precedence over the file.
 Result<void> take_from_config(Options& options) {
-  auto config = daemon::load_config(options.config);
+  auto config = daemon::load_participant_config(options.config);
   if (!config) return tl::make_unexpected(config.error());
 
   options.participant.domain = config->dds.domain;

@@ -16,19 +16,19 @@ using daemon::Result;
 constexpr double kMillimetre = 1e-3;
 constexpr double kMicrometre = 1e-6;
 
-calib::Vector3 vector_of(const std::array<double, 3>& a) {
+Eigen::Vector3d vector_of(const std::array<double, 3>& a) {
   return {a[0], a[1], a[2]};
 }
 
 }  // namespace
 
-Result<calib::ErrorLattice> lattice_of(std::span<const v1::GridNode> nodes) {
-  std::vector<calib::LatticeNode> lattice;
+Result<daemon::ErrorLattice> lattice_of(std::span<const v1::GridNode> nodes) {
+  std::vector<daemon::LatticeNode> lattice;
   for (const v1::GridNode& node : nodes) {
     lattice.push_back({vector_of(node.position_m()), vector_of(node.error_m()), node.inside()});
   }
-  auto created = calib::ErrorLattice::create(lattice);
-  if (!created) return daemon::fail(ErrorCode::BadInput, "received grid: " + created.error().text);
+  auto created = daemon::ErrorLattice::create(lattice);
+  if (!created) return daemon::fail(created.error().code, "received grid: " + created.error().text);
   return std::move(*created);
 }
 

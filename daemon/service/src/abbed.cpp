@@ -585,7 +585,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   auto state = std::make_unique<State>(std::move(config), std::move(options));
   prepare_background_tasks();
 
-  use_dds_unit(state->config, state->options.dds_unit);
+  use_dds_unit(state->config.dds, state->config.daemon.runtime_dir, state->options.dds_unit);
   for (const auto& directory :
        {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
         state->config.dds.socket.parent_path()}) {

@@ -3,7 +3,7 @@
 
 #include "abbe/base/faults.hpp"
 #include "abbe/calib/mfb/run/bar.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 
 namespace abbe::daemon {
 

@@ -10,10 +10,10 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/config/bounded_toml.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_input.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 #include "expansivity.hpp"
 #include "whole_number.hpp"
 

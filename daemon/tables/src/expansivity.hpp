@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "abbe/calib/environment/thermal_expansion.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 
 namespace abbe::daemon {
 

@@ -7,8 +7,8 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
-#include "abbe/config/bounded_toml.hpp"
-#include "abbe/config/section.hpp"
+#include "abbe/settings/bounded_toml.hpp"
+#include "abbe/settings/section.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -10,7 +10,7 @@
 namespace abbe::dds {
 namespace {
 
-using calib::Vector3;
+using Eigen::Vector3d;
 
 std::vector<v1::GridNode> sample_nodes() {
   std::vector<v1::GridNode> nodes;
@@ -19,27 +19,27 @@ std::vector<v1::GridNode> sample_nodes() {
   return nodes;
 }
 
-Vector3 sample_error(const Vector3& p) {
+Vector3d sample_error(const Vector3d& p) {
   const auto e = test::error_at({p[0], p[1], p[2]});
   return {e[0], e[1], e[2]};
 }
 
 struct Known {
-  std::vector<Vector3> positions_m, errors_m;
-  void add(const Vector3& p, const Vector3& e) {
+  std::vector<Vector3d> positions_m, errors_m;
+  void add(const Vector3d& p, const Vector3d& e) {
     positions_m.push_back(p);
     errors_m.push_back(e);
   }
   [[nodiscard]] auto compared() const {
-    return calib::compare(positions_m, errors_m, lattice_of(sample_nodes()).value());
+    return daemon::compare(positions_m, errors_m, lattice_of(sample_nodes()).value());
   }
 };
 
 /// Four points that span the volume, with the errors of the sample grid plus `rest`.
 Known known_with(const auto& rest) {
   Known known;
-  for (const Vector3& p : {Vector3(0.1, 0.2, 0.33), Vector3(0.7, 0.1, 0.2), Vector3(0.2, 0.75, 0.1),
-                           Vector3(0.4, 0.4, 0.8)}) {
+  for (const Vector3d& p : {Vector3d(0.1, 0.2, 0.33), Vector3d(0.7, 0.1, 0.2), Vector3d(0.2, 0.75, 0.1),
+                           Vector3d(0.4, 0.4, 0.8)}) {
     known.add(p, sample_error(p) + rest(p));
   }
   return known;
@@ -48,9 +48,9 @@ Known known_with(const auto& rest) {
 TEST(ReceivedLattice, IsExactAtAndBetweenNodesForErrorsLinearInEachCoordinate) {
   const auto grid = lattice_of(sample_nodes());
   ASSERT_TRUE(grid.has_value());
-  for (const Vector3& p : {Vector3(0, 0, 0), Vector3(0.8, 0.8, 0.8), Vector3(0.33, 0.41, 0.77),
-                           Vector3(0.1, 0.2, 0.3)}) {
-    Vector3 error;
+  for (const Vector3d& p : {Vector3d(0, 0, 0), Vector3d(0.8, 0.8, 0.8), Vector3d(0.33, 0.41, 0.77),
+                           Vector3d(0.1, 0.2, 0.3)}) {
+    Vector3d error;
     ASSERT_TRUE(grid->at(p, error));
     EXPECT_LT((error - sample_error(p)).norm(), 1e-18)
         << p.transpose();  // rounding of errors of 1e-5 m
@@ -60,7 +60,7 @@ TEST(ReceivedLattice, IsExactAtAndBetweenNodesForErrorsLinearInEachCoordinate) {
 TEST(ReceivedLattice, OutsideHasNoAnswer) {
   const auto grid = lattice_of(sample_nodes());
   ASSERT_TRUE(grid.has_value());
-  Vector3 error;
+  Vector3d error;
   EXPECT_FALSE(grid->at({0.9, 0.1, 0.1}, error));
   EXPECT_FALSE(grid->at({0.1, -1e-6, 0.1}, error));
 }
@@ -70,7 +70,7 @@ TEST(ReceivedLattice, HasNoAnswerInACellWithACornerTheDataDidNotCover) {
   for (auto& node : nodes) node.inside(node.position_m()[2] < 0.75);
   const auto grid = lattice_of(nodes);
   ASSERT_TRUE(grid.has_value());
-  Vector3 error;
+  Vector3d error;
   EXPECT_TRUE(grid->at({0.1, 0.2, 0.65}, error));
   EXPECT_FALSE(grid->at({0.1, 0.2, 0.75}, error));
 }
@@ -82,8 +82,8 @@ TEST(ReceivedLattice, RefusesAGridWithAHole) {
 }
 
 TEST(GridComparison, ARigidMotionIsNotObservable) {
-  const Vector3 shift(3e-6, 0, -2e-6), rotation(1e-6, 2e-6, -1e-6);
-  const auto moved = [&](const Vector3& p) -> Vector3 { return shift + rotation.cross(p); };
+  const Vector3d shift(3e-6, 0, -2e-6), rotation(1e-6, 2e-6, -1e-6);
+  const auto moved = [&](const Vector3d& p) -> Vector3d { return shift + rotation.cross(p); };
   const auto known = known_with(moved);
   const auto comparison = known.compared();
   ASSERT_TRUE(comparison.has_value());
@@ -93,7 +93,7 @@ TEST(GridComparison, ARigidMotionIsNotObservable) {
 }
 
 TEST(GridComparison, PointsOutsideAreCountedAndLeftOut) {
-  auto known = known_with([](const Vector3&) { return Vector3::Zero().eval(); });
+  auto known = known_with([](const Vector3d&) { return Vector3d::Zero().eval(); });
   known.add({2.0, 0, 0}, {1.0, 0, 0});
   const auto comparison = known.compared();
   ASSERT_TRUE(comparison.has_value());
@@ -104,10 +104,10 @@ TEST(GridComparison, PointsOutsideAreCountedAndLeftOut) {
 
 TEST(GridComparison, PointsOnALineAreTooFew) {
   Known known;
-  for (const double x : {0.1, 0.2, 0.3}) known.add({x, 0.1, 0.1}, Vector3::Zero());
+  for (const double x : {0.1, 0.2, 0.3}) known.add({x, 0.1, 0.1}, Vector3d::Zero());
   const auto comparison = known.compared();
   ASSERT_FALSE(comparison.has_value());
-  EXPECT_EQ(comparison.error().code, calib::ErrorCode::DegenerateGeometry);
+  EXPECT_EQ(comparison.error().code, daemon::ErrorCode::DataInsufficient);
 }
 
 }  // namespace

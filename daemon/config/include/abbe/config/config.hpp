@@ -21,6 +21,7 @@
 #include "abbe/config/meaning.hpp"
 #include "abbe/drivers/axis_kind.hpp"
 #include "abbe/drivers/real_time_mode.hpp"
+#include "abbe/settings/dds_config.hpp"
 
 namespace abbe::daemon {
 
@@ -134,7 +135,7 @@ using drivers::RealTimeMode;
 struct DaemonConfig {
   std::filesystem::path data_dir = "/var/lib/abbe";
   [[nodiscard]] std::filesystem::path models_dir() const { return data_dir / "models"; }
-  std::filesystem::path runtime_dir = "/run/abbe";
+  std::filesystem::path runtime_dir = kRuntimeFolder;
   std::chrono::nanoseconds hub_period{std::chrono::microseconds{250}};
   /// The longest time for which the hub waits for samples of a stream that arrive late.
   std::chrono::nanoseconds watermark{std::chrono::milliseconds{600}};
@@ -172,29 +173,6 @@ struct RecordingConfig {
 struct ModelRetention {
   std::size_t keep_newest = 0;  ///< models added last that are kept at any age; 0: keep all
   std::chrono::hours keep{0};   ///< [models] keep_days; models that were added later are kept
-};
-
-/// Who runs abbe-dds. ByStart: systemd if abbed runs as abbed.service, else abbed itself;
-/// use_dds_unit() decides it.
-enum class Supervise { ByStart, Child, Systemd, Off };
-
-/// [dds]
-struct DdsConfig {
-  std::uint32_t domain = 0;
-  double snapshot_hz = 50.0;       ///< maximum rate; 0: with every hub cycle that has new data
-  double compensation_hz = 100.0;  ///< maximum rate; 0: with every hub cycle that has new data
-  /// A subscriber must not apply a compensation vector older than this.
-  std::chrono::nanoseconds validity{std::chrono::milliseconds{500}};
-  Supervise supervise = Supervise::ByStart;
-  /// With Systemd: the user as which abbe-dds runs, which alone may connect; empty: that of abbed.
-  std::string user = "abbe-dds";
-  int priority = 20;  ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: not SCHED_FIFO
-  std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
-  /// Folder of keys made by `abbe dds keys`; empty: the profile decides.
-  std::filesystem::path security;
-  /// Default: runtime_dir/dds.sock; with Systemd dds.sock in the folder "RUNTIME_DIR-dds", which
-  /// abbe-dds may enter.
-  std::filesystem::path socket;
 };
 
 /// [gate]: the conditions that a model must satisfy before it may become active.
@@ -340,10 +318,6 @@ struct Config {
   /// True if the control already corrects the readings of any axis.
   [[nodiscard]] bool axes_compensated() const;
 };
-
-/// Decides [dds] supervise, if the configuration does not, and the socket that follows from it.
-/// `unit`: abbed runs as abbed.service, beside abbe-dds.service.
-void use_dds_unit(Config& config, bool unit);
 
 /// Reads and checks a whole file. Io if the file cannot be read, else BadInput with one line per
 /// fault in Error::details, at most 1000, each "file:line:column: key: what is wrong". A file with

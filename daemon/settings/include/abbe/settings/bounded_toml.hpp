@@ -5,6 +5,7 @@
 
 #include <toml++/toml.h>
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -19,5 +20,12 @@ using protocol::TomlBounds;
 /// error is reported, because the faults after it would not be reliable.
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file,
                                              const TomlBounds& bounds = {});
+
+/// A file that a person wrote has fewer faults than this; the limit shortens the list for a file
+/// that is not a configuration at all.
+inline constexpr std::size_t kMostConfigFaults = 1000;
+
+/// Io if the file cannot be read.
+[[nodiscard]] Result<std::string> read_configuration_text(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

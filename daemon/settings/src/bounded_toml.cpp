@@ -1,8 +1,12 @@
-#include "abbe/config/bounded_toml.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
 
 #include "abbe/base/faults.hpp"
 #include "abbe/protocol/toml_nesting.hpp"
@@ -35,6 +39,15 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file,
     faults.add(error.source().begin.line, error.source().begin.column, "", error.description());
     return tl::make_unexpected(faults.to_error());
   }
+}
+
+Result<std::string> read_configuration_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
+  if (in.bad() || !in.is_open())
+    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
+  return text.str();
 }
 
 }  // namespace abbe::daemon

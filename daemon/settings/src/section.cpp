@@ -1,4 +1,4 @@
-#include "abbe/config/section.hpp"
+#include "abbe/settings/section.hpp"
 #include "abbe/protocol/printable.hpp"
 
 #include <fmt/format.h>

@@ -1,0 +1,53 @@
+#pragma once
+/// The volumetric error V at the nodes of a lattice, as a DDS subscriber receives it, and the
+/// comparison of such a field with known errors. Lengths in m. Pure.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+
+namespace abbe::daemon {
+
+struct LatticeNode {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d V_m = Eigen::Vector3d::Zero();
+  bool inside = true;  ///< in the validity volume of the model
+};
+
+/// Interpolates V between the nodes, linearly in x, y and z. A cell has a value only if all its
+/// corners are `inside`. Immutable value.
+class ErrorLattice {
+ public:
+  /// Nodes in any order. BadInput unless every combination of the x, y and z coordinates that occur
+  /// is present exactly once, and for NaN or infinity.
+  [[nodiscard]] static Result<ErrorLattice> create(std::span<const LatticeNode> nodes);
+  /// False, and `V_m` unchanged, if the position is outside the lattice or in a cell without value.
+  [[nodiscard]] bool at(const Eigen::Vector3d& position_m, Eigen::Vector3d& V_m) const;
+
+ private:
+  std::array<std::vector<double>, 3> coordinates_m_;
+  std::vector<Eigen::Vector3d> V_m_;  ///< by x, then y, then z; z varies fastest
+  std::vector<bool> inside_;      ///< same order as V_m_
+};
+
+struct FieldComparison {
+  struct Lengths {
+    double mean_m = 0.0, max_m = 0.0;
+  };
+  std::size_t points = 0;      ///< number of compared points
+  std::size_t outside = 0;     ///< points without a value in the field
+  Lengths before;              ///< |V_known|
+  Lengths after;               ///< |V_known - V_field|, gauges unchanged
+  Lengths after_rigid_free;    ///< after removal of the best-fit rigid motion T + r x p
+};
+/// Compares `known_V_m` at `positions_m` with the field. DataInsufficient for fewer than 3 points
+/// inside the field, or all of them on a line.
+[[nodiscard]] Result<FieldComparison> compare(std::span<const Eigen::Vector3d> positions_m,
+                                              std::span<const Eigen::Vector3d> known_V_m,
+                                              const ErrorLattice& field);
+
+}  // namespace abbe::daemon

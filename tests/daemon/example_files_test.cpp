@@ -43,7 +43,7 @@ class ExampleFiles : public ::testing::Test {
 };
 
 TEST_F(ExampleFiles, OfTheMachineAreAccepted) {
-  for (const std::string name : {"abbed.toml", "machine.toml"}) {
+  for (const std::string name : {"abbed.toml", "machine.toml", "first_abbed.toml"}) {
     const auto file = printed(name);
     EXPECT_EQ(test::faults_text(parse_config(test::text_of(file), file)), "") << name;
   }
@@ -96,14 +96,14 @@ TEST_F(ExampleFiles, AreListed) {
   const auto ran = abbe("example");
   EXPECT_EQ(ran.exit, 0) << ran.err;
   for (const char* name :
-       {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
+       {"abbed.toml", "machine.toml", "first_abbed.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
         "encoder.csv", "touches.csv", "bar.toml", "plan.toml", "barpoints.csv", "gauge.toml",
         "parts.toml", "errors.csv", "points.csv", "verification.csv", "certificate.toml",
         "mtconnect-devices.xml", "truth.csv"})
     EXPECT_THAT(ran.out, HasSubstr(name));
   std::istringstream lines(ran.out.substr(0, ran.out.find("\n\n")));
   for (std::string line; std::getline(lines, line);)
-    EXPECT_THAT(line, ::testing::MatchesRegex("[a-z.-]+ +[a-z].*")) << "without a purpose";
+    EXPECT_THAT(line, ::testing::MatchesRegex("[a-z_.-]+ +[a-z].*")) << "without a purpose";
   EXPECT_THAT(abbe("--help").out, HasSubstr("example"));
 }
 

@@ -27,6 +27,7 @@
 #include "abbe/config/check_config.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/messages/dds_security.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/service/abbed.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "abbe/service/process_signals.hpp"
@@ -87,7 +88,7 @@ Result<void> check_dds_keys(const DdsConfig& dds) {
     return {};
   const auto identity =
       find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
-  if (!identity) return tl::unexpected(identity.error());
+  ABBE_TRY(identity);
   return {};
 }
 

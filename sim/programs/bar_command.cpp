@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/mfb/reversal.hpp"
 #include "bar_options.hpp"
 #include "clamping_loop.hpp"
@@ -65,7 +66,7 @@ struct Reversal {
 
 Result<Reversal> reversal_of(const ReversalCommandOptions& options) {
   auto stated = probing_of(options);
-  if (!stated) return tl::unexpected(stated.error());
+  ABBE_TRY(stated);
   stated->shape_scatter_m = options.shape_scatter_um * kMicro;
   Reversal out{
       *stated,

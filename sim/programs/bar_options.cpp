@@ -6,6 +6,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "abbe/result/try.hpp"
 #include "files.hpp"
 #include "toml_section.hpp"
 
@@ -67,7 +68,7 @@ void add_probing(CLI::App& app, BarOptions& o) {
 Result<void> add_outliers(const BarOptions& o, mfb::ProbingOptions& probing) {
   for (const std::string& text : o.outliers) {
     const auto outlier = split_at_equals(text, "--outlier");
-    if (!outlier) return tl::unexpected(outlier.error());
+    ABBE_TRY(outlier);
     double um = 0.0;
     const char* end = outlier->value.data() + outlier->value.size();
     if (std::from_chars(outlier->value.data(), end, um).ptr != end || outlier->value.empty())
@@ -82,7 +83,7 @@ Result<void> add_turned(const BarOptions& o, mfb::ProbingOptions& probing) {
   constexpr std::string_view kAxisNames = "xyz";  // in the order of mfb::Turned
   for (const std::string& text : o.turned) {
     const auto turned = split_at_equals(text, "--turned");
-    if (!turned) return tl::unexpected(turned.error());
+    ABBE_TRY(turned);
     const std::size_t axis = turned->value.size() == 1 ? kAxisNames.find(turned->value[0]) : 3;
     if (axis >= kAxisNames.size())
       return usage_error(fmt::format("--turned \"{}\": the axis must be x, y or z", text));

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "abbe/result/try.hpp"
 #include "files.hpp"
 
 namespace abbe::sim {
@@ -40,7 +41,7 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
   if (ports.cmm) lines += fmt::format("cmm_port={}\n", *ports.cmm);
 
   if (!path.empty()) {
-    if (auto written = write_file(path, lines); !written) return written;
+    ABBE_TRY(write_file(path, lines));
   }
 
   if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);

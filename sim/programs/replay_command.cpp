@@ -8,6 +8,7 @@
 
 #include <toml++/toml.h>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/replay.hpp"
 #include "commands.hpp"
 #include "event_loop.hpp"
@@ -94,13 +95,13 @@ Ports ports_of(const std::vector<ReplayedPlace>& places) {
 
 Result<std::unique_ptr<Replay>> open(const ReplayOptions& options, HostTime now) {
   const auto text = read_file(options.file);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
   const auto bytes = std::as_bytes(std::span(*text));
   const auto devices = read_traffic(bytes, options.file);
-  if (!devices) return tl::unexpected(devices.error());
+  ABBE_TRY(devices);
   ReplaySetup setup = options.setup;
   setup.bus.speed = options.speed;
-  if (const auto read = read_places(options, setup); !read) return tl::unexpected(read.error());
+  ABBE_TRY(read_places(options, setup));
   read_serials(recorded_configuration(bytes), setup.serials);
   return Replay::open(*devices, setup, now);
 }

@@ -1,5 +1,6 @@
 #include "setup_file.hpp"
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/truth_table.hpp"
 #include "files.hpp"
 #include "read_machine.hpp"
@@ -78,9 +79,9 @@ Result<void> make_truth(SetupDraft& draft) {
     return {};
   }
   const auto text = read_file(draft.truth_file);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
   auto read = parse_truth_csv(*text, draft.truth_file, truth, draft.random.shape);
-  if (!read) return tl::unexpected(read.error());
+  ABBE_TRY(read);
   truth = *read;
   return {};
 }
@@ -108,9 +109,9 @@ Result<void> check_control(const SetupDraft& draft) {
 Result<void> make_path(const SetupDraft& draft, PathPlan& path) {
   if (draft.path_file.empty()) return usage_error("no path: give --path FILE or [sim.path] file");
   const auto text = read_file(draft.path_file);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
   auto vertices = parse_path_csv(*text, draft.path_file);
-  if (!vertices) return tl::unexpected(vertices.error());
+  ABBE_TRY(vertices);
   if (vertices->size() < 2)
     return bad_input(draft.path_file + ": a path needs at least two vertices");
   path.vertices = *vertices;
@@ -153,21 +154,20 @@ Result<LoadedSetup> load_setup(const SetupChoices& choices) {
   SetupDraft draft;
   SimulationSetup& simulation = draft.setup.simulation;
   add_usual_devices(simulation);
-  if (const auto read = read_files(choices, draft); !read) return tl::unexpected(read.error());
+  ABBE_TRY(read_files(choices, draft));
   apply_choices(choices, draft);
-  if (const auto made = make_truth(draft); !made) return tl::unexpected(made.error());
+  ABBE_TRY(make_truth(draft));
 
   if (simulation.control_port) {
-    if (const auto checked = check_control(draft); !checked) return tl::unexpected(checked.error());
+    ABBE_TRY(check_control(draft));
     stand_in_the_middle(simulation);
   } else if (choices.needs_path) {
-    if (const auto made = make_path(draft, simulation.path); !made)
-      return tl::unexpected(made.error());
+    ABBE_TRY(make_path(draft, simulation.path));
   }
 
   if (!draft.artefact_file.empty()) {
     const auto read = read_artefact(draft.artefact_file, simulation.measuring_machine->machine);
-    if (!read) return tl::unexpected(read.error());
+    ABBE_TRY(read);
   }
 
   share_seed_and_speed(draft);

@@ -8,6 +8,7 @@
 
 #include "abbe/protocol/table/faults.hpp"
 #include "abbe/protocol/toml_nesting.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/sim/sim_clock.hpp"
 #include "files.hpp"
 
@@ -201,9 +202,9 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file) {
 Result<void> read_toml_file(const std::string& file,
                             const std::function<void(TomlSection)>& reader) {
   const auto text = read_file(file);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
   const auto table = parse_toml(*text, file);
-  if (!table) return tl::unexpected(table.error());
+  ABBE_TRY(table);
   TomlFaults faults(file);
   reader(TomlSection(&*table, "", faults));
   if (faults.any()) return tl::unexpected(faults.error());

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <memory>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/truth_table.hpp"
 #include "commands.hpp"
 #include "files.hpp"
@@ -45,9 +46,9 @@ std::vector<Eigen::Vector3d> grid_points(const TruthMachine& truth,
 
 Result<std::vector<Eigen::Vector3d>> file_points(const std::string& file) {
   const auto text = read_file(file);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
   const auto rows = parse_path_csv(*text, file);  // the same columns
-  if (!rows) return tl::unexpected(rows.error());
+  ABBE_TRY(rows);
   std::vector<Eigen::Vector3d> points;
   for (const PathVertex& row : *rows) points.push_back(row.q_m);
   return points;

@@ -4,11 +4,13 @@
 
 #include <array>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::sim {
 
 Result<ControlPort> ControlPort::open(std::uint16_t port) {
   auto socket = bind_udp(port);
-  if (!socket) return tl::unexpected(socket.error());
+  ABBE_TRY(socket);
   // For the records of a second, which a sender that was stopped sends at once.
   constexpr int kBytes = 1 << 20;
   ::setsockopt(socket->get(), SOL_SOCKET, SO_RCVBUF, &kBytes, sizeof kBytes);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::sim {
 namespace {
 
@@ -19,7 +21,7 @@ Result<EncoderBus> EncoderBus::open(const EncoderBusOptions& options,
                                     std::span<const EncoderNodeOptions> nodes,
                                     const VirtualMachine& machine, HostTime now) {
   auto port = CanPort::open(options);
-  if (!port) return tl::unexpected(port.error());
+  ABBE_TRY(port);
   EncoderBus bus(std::move(*port));
   for (const EncoderNodeOptions& node : nodes) bus.nodes_.emplace_back(node, machine, now);
   return bus;

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <utility>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/pseudo_terminal.hpp"
 #include "abbe/sim/socket.hpp"
 
@@ -86,12 +87,12 @@ struct ModbusServer::State {
 Result<void> ModbusServer::State::plug_in() {
   if (serial()) {
     auto opened = PseudoTerminal::open(link());
-    if (!opened) return tl::unexpected(opened.error());
+    ABBE_TRY(opened);
     terminal = std::move(*opened);
     return {};
   }
   auto opened = listen_tcp(port_number);
-  if (!opened) return tl::unexpected(opened.error());
+  ABBE_TRY(opened);
   listener = std::move(*opened);
   port_number = port_of(listener);
   return {};
@@ -219,7 +220,7 @@ Result<ModbusServer> ModbusServer::open(const ModbusServerOptions& options, Host
   state->start = now;
   if (const auto* tcp = std::get_if<ModbusTcpEndpoint>(&options.endpoint))
     state->port_number = tcp->port;
-  if (auto plugged = state->plug_in(); !plugged) return tl::unexpected(plugged.error());
+  ABBE_TRY(state->plug_in());
   state->context.reset(state->serial() ? modbus_new_rtu(state->link().c_str(), 19200, 'E', 8, 1)
                                        : modbus_new_tcp("127.0.0.1", state->port_number));
   if (!state->context) return io_error(fmt::format("{}: {}", options.name, modbus_strerror(errno)));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::sim {
 namespace {
 
@@ -33,7 +35,7 @@ std::vector<PathVertex> vertices_reached(const PathPlan& plan) {
 }  // namespace
 
 Result<PathMotion> PathMotion::plan(const PathPlan& plan) {
-  if (const auto valid = check_plan(plan); !valid) return tl::unexpected(valid.error());
+  ABBE_TRY(check_plan(plan));
   const std::vector<PathVertex> vertices = vertices_reached(plan);
   if (plan.wait_s > 0.0 && vertices.size() < 3)
     return bad_input(

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abbe/protocol/can/udp_framing.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -29,7 +30,7 @@ Result<RecordedBus> RecordedBus::open(const EncoderBusOptions& options,
                                       const RecordedDevice& device, ReplayTimeline& timeline,
                                       bool leads) {
   auto port = CanPort::open(options);
-  if (!port) return tl::unexpected(port.error());
+  ABBE_TRY(port);
   return RecordedBus(std::move(*port), device, timeline, leads);
 }
 

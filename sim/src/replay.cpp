@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/controller_server.hpp"
 #include "abbe/sim/recorded_bus.hpp"
 #include "abbe/sim/recorded_card.hpp"
@@ -149,7 +150,7 @@ class Maker {
   [[nodiscard]] Made controller(const RecordedDevice& device, std::uint16_t port,
                                 std::unique_ptr<Controller> recorded) const {
     auto server = ControllerServer<Controller>::open(port, std::move(recorded));
-    if (!server) return tl::unexpected(server.error());
+    ABBE_TRY(server);
     return std::make_unique<ReplayedController<Controller>>(device.name, device.kind,
                                                             std::move(*server));
   }
@@ -165,7 +166,7 @@ class Maker {
     CanPortOptions options = setup_.bus;
     options.port = chosen(setup_.ports, device.name, options.port);
     auto bus = RecordedBus::open(options, device, timeline_, !has_tracker_);
-    if (!bus) return tl::unexpected(bus.error());
+    ABBE_TRY(bus);
     return std::make_unique<ReplayedBus>(device.name, options.interface, std::move(*bus));
   }
   [[nodiscard]] Made card(const RecordedDevice& device) const {
@@ -174,7 +175,7 @@ class Maker {
     const RecordedCard& recorded = *card;
     auto server =
         UsbipServer::open(chosen(setup_.ports, device.name, std::uint16_t{0}), std::move(card));
-    if (!server) return tl::unexpected(server.error());
+    ABBE_TRY(server);
     return std::make_unique<ReplayedCard>(device.name, std::move(*server), recorded);
   }
   [[nodiscard]] Made terminal(const RecordedDevice& device) const {
@@ -183,7 +184,7 @@ class Maker {
     auto server = TerminalServer::open(
         chosen(setup_.links, device.name, anywhere.string()),
         std::make_unique<RecordedDialogue>(device, dialogue_wire(device.kind)), now_);
-    if (!server) return tl::unexpected(server.error());
+    ABBE_TRY(server);
     return std::make_unique<ReplayedTerminal>(device.name, std::move(*server));
   }
 
@@ -203,7 +204,7 @@ Result<std::unique_ptr<Replay>> Replay::open(const std::vector<RecordedDevice>& 
   const Maker maker(setup, replay->timeline_, has_tracker, now);
   for (const RecordedDevice& device : devices) {
     auto made = maker.make(device);
-    if (!made) return tl::unexpected(made.error());
+    ABBE_TRY(made);
     replay->devices_.push_back(std::move(*made));
   }
   return replay;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::sim {
 
 Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup,
@@ -19,11 +21,11 @@ Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetu
 
 Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setup, HostTime now) {
   auto path = PathMotion::plan(setup.path);
-  if (!path) return tl::unexpected(path.error());
+  ABBE_TRY(path);
   std::optional<ControlPort> control;
   if (setup.control_port) {
     auto opened = ControlPort::open(*setup.control_port);
-    if (!opened) return tl::unexpected(opened.error());
+    ABBE_TRY(opened);
     control.emplace(std::move(*opened));
   }
   std::unique_ptr<Simulation> simulation(
@@ -33,7 +35,7 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     auto tracker = TrackerServer::open(
         setup.tracker_port,
         std::make_unique<TrackerDevice>(*setup.tracker, simulation->machine_, now));
-    if (!tracker) return tl::unexpected(tracker.error());
+    ABBE_TRY(tracker);
     simulation->tracker_.emplace(std::move(*tracker));
   }
 
@@ -41,7 +43,7 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     auto nodes = setup.nodes;
     for (EncoderNodeOptions& node : nodes) node.configured = setup.sync_period.count() > 0;
     auto bus = EncoderBus::open(*setup.bus, nodes, simulation->machine_, now);
-    if (!bus) return tl::unexpected(bus.error());
+    ABBE_TRY(bus);
     simulation->bus_.emplace(std::move(*bus));
     if (setup.sync_period.count() > 0)
       simulation->bus_->produce_sync(setup.sync_period, now + setup.sync_period);
@@ -49,20 +51,20 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
 
   for (const ModbusServerOptions& options : setup.environment) {
     auto server = ModbusServer::open(options, now);
-    if (!server) return tl::unexpected(server.error());
+    ABBE_TRY(server);
     simulation->environment_.push_back(std::move(*server));
   }
 
   for (const CounterCardSetup& card : setup.counter_cards) {
     auto server = UsbipServer::open(card.port, wire(card, simulation->machine_));
-    if (!server) return tl::unexpected(server.error());
+    ABBE_TRY(server);
     simulation->counter_cards_.push_back(std::move(*server));
   }
 
   if (setup.measuring_machine) {
     auto server = IppDmeServer::open(setup.measuring_machine_port,
                                      std::make_unique<IppDmeDevice>(*setup.measuring_machine, now));
-    if (!server) return tl::unexpected(server.error());
+    ABBE_TRY(server);
     simulation->measuring_machine_.emplace(std::move(*server));
   }
 

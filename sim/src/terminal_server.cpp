@@ -5,13 +5,15 @@
 #include <array>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::sim {
 
 Result<TerminalServer> TerminalServer::open(const std::string& link,
                                             std::unique_ptr<RecordedDialogue> device,
                                             HostTime now) {
   auto terminal = PseudoTerminal::open(link);
-  if (!terminal) return tl::unexpected(terminal.error());
+  ABBE_TRY(terminal);
   device->connected(now);
   return TerminalServer(std::move(*terminal), link, std::move(device));
 }

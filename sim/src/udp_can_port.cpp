@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abbe/protocol/can/udp_framing.hpp"
+#include "abbe/result/try.hpp"
 #include "can_port.hpp"
 
 namespace abbe::sim {
@@ -95,7 +96,7 @@ class UdpCanPort final : public CanPort {
 
 Result<std::unique_ptr<CanPort>> open_udp_port(const CanPortOptions& options) {
   auto socket = bind_udp(options.port);
-  if (!socket) return tl::unexpected(socket.error());
+  ABBE_TRY(socket);
   return std::make_unique<UdpCanPort>(std::move(*socket), options);
 }
 

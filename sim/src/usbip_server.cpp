@@ -8,6 +8,8 @@
 #include <cerrno>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::sim {
 namespace {
 
@@ -27,7 +29,7 @@ std::size_t wanted_bytes(const auto& requests) {
 
 Result<UsbipServer> UsbipServer::open(std::uint16_t port, const CounterCardOptions& card) {
   auto listener = listen_tcp(port);
-  if (!listener) return tl::unexpected(listener.error());
+  ABBE_TRY(listener);
   auto simulated = std::make_unique<CounterCard>(card);
   CounterCard* const simulated_card = simulated.get();
   UsbipServer server(std::move(*listener), std::move(simulated));
@@ -37,7 +39,7 @@ Result<UsbipServer> UsbipServer::open(std::uint16_t port, const CounterCardOptio
 
 Result<UsbipServer> UsbipServer::open(std::uint16_t port, std::unique_ptr<ExportedCard> card) {
   auto listener = listen_tcp(port);
-  if (!listener) return tl::unexpected(listener.error());
+  ABBE_TRY(listener);
   return UsbipServer(std::move(*listener), std::move(card));
 }
 

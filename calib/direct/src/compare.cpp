@@ -9,6 +9,7 @@
 #include "abbe/calib/internal/direct/convention.hpp"
 #include "abbe/calib/internal/direct/judge.hpp"
 #include "abbe/calib/internal/direct/scatter.hpp"
+#include "abbe/result/try.hpp"
 #include "causes.hpp"
 #include "device.hpp"
 #include "model_curve.hpp"
@@ -74,9 +75,7 @@ std::string why_no_common_range(const Runs& runs, const ModelCurve& curve) {
 Result<Reduced> compare_motion(const MeasuredError& error, ErrorMotion motion,
                                const VolumetricModel& model, const CompareOptions& options) {
   const auto all = runs_of(error);
-  if (!all) {
-    return tl::make_unexpected(all.error());
-  }
+  ABBE_TRY(all);
   Reduced out;
   out.table.name = error.name;
   out.table.is_angle = is_rotation(motion.motion);
@@ -129,9 +128,7 @@ Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricM
                                    std::span<const Reduced> motions,
                                    const CompareOptions& options) {
   const auto runs = runs_of(error);
-  if (!runs) {
-    return tl::make_unexpected(runs.error());
-  }
+  ABBE_TRY(runs);
   if (runs->positions_m.size() != 1) {
     return failure(
         ErrorCode::BadInput,
@@ -218,9 +215,7 @@ Result<std::vector<TableComparison>> compare(std::span<const MeasuredError> erro
         "comparison: the model consists of polynomials and has no tables of error motions");
   }
   for (const Result<void>& valid : {check_names(errors), check_options(options)}) {
-    if (!valid) {
-      return tl::make_unexpected(valid.error());
-    }
+    ABBE_TRY(valid);
   }
 
   std::vector<Reduced> all(errors.size());
@@ -232,9 +227,7 @@ Result<std::vector<TableComparison>> compare(std::span<const MeasuredError> erro
       }
       auto reduced = motion ? compare_motion(errors[i], *motion, model, options)
                             : compare_squareness(errors[i], model, all, options);
-      if (!reduced) {
-        return tl::make_unexpected(reduced.error());
-      }
+      ABBE_TRY(reduced);
       all[i] = std::move(*reduced);
     }
   }

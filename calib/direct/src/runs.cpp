@@ -10,6 +10,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::direct {
 namespace {
@@ -249,21 +250,13 @@ Eigen::MatrixXd Runs::covariance_of_mean(const Eigen::MatrixXd& P) const {
 }
 
 Result<Runs> runs_of(const MeasuredError& error) {
-  if (Result<void> valid = check_readings(error); !valid) {
-    return tl::make_unexpected(valid.error());
-  }
+  ABBE_TRY(check_readings(error));
   const std::vector<double> targets = targets_of(error);
   const auto runs = by_run(error, targets);
-  if (!runs) {
-    return tl::make_unexpected(runs.error());
-  }
-  if (Result<void> valid = check_copies(error.name, *runs); !valid) {
-    return tl::make_unexpected(valid.error());
-  }
+  ABBE_TRY(runs);
+  ABBE_TRY(check_copies(error.name, *runs));
   const auto directions = directions_of(error.name, *runs);
-  if (!directions) {
-    return tl::make_unexpected(directions.error());
-  }
+  ABBE_TRY(directions);
 
   const auto complete = complete_targets(*runs, targets.size(), *directions);
   if (complete.empty()) {

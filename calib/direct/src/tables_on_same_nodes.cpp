@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/geometry/rigid_body_effects.hpp"
 #include "abbe/calib/internal/geometry/rigid_body_model.hpp"
 #include "abbe/calib/internal/statistics/student_tail.hpp"
+#include "abbe/result/try.hpp"
 #include "device.hpp"
 #include "model_curve.hpp"
 #include "squareness.hpp"
@@ -197,9 +198,7 @@ Result<UsableErrors> usable_errors(std::span<const MeasuredError> errors,
   for (const MeasuredError& error : errors) {
     const auto motion = error_motion(error.name);
     auto runs = runs_of(error);
-    if (!runs) {
-      return tl::make_unexpected(runs.error());
-    }
+    ABBE_TRY(runs);
     if (!motion) {
       out.used.push_back({&error, std::nullopt, *runs, *runs});
     } else if (model.tables()->layout().find(*motion)) {
@@ -240,9 +239,7 @@ Result<ParameterLayout> common_layout(const std::vector<UsedError>& used,
   MachineNodes nodes;
   for (const Axis axis : kAllAxes) {
     const auto of_axis = common_nodes(used, axis, model.tables()->layout().nodes()[index(axis)]);
-    if (!of_axis) {
-      return tl::make_unexpected(of_axis.error());
-    }
+    ABBE_TRY(of_axis);
     nodes[index(axis)] = *of_axis;
   }
   std::vector<ErrorMotion> motions;

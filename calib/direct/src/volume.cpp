@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "abbe/calib/internal/direct/scatter.hpp"
+#include "abbe/result/try.hpp"
 #include "tables_on_same_nodes.hpp"
 
 namespace abbe::calib::direct {
@@ -16,9 +17,7 @@ Result<VolumetricModel> model_of(const ParameterLayout& layout, const TableValue
     axis.nodes_m = {axis.nodes_m.front(), axis.nodes_m.back()};
   }
   auto validity = ValidityVolume::hull_of(tensor_grid(ends));
-  if (!validity) {
-    return tl::make_unexpected(validity.error());
-  }
+  ABBE_TRY(validity);
   const Eigen::MatrixXd symmetric = 0.5 * (values.cov_U + values.cov_U.transpose());
   return VolumetricModel::from_vector(layout, Gauge::G2, like.tool_offsets_m().first(1), values.U,
                                       symmetric, std::move(*validity));
@@ -91,13 +90,9 @@ Result<VolumeComparison> compare_in_volume(std::span<const MeasuredError> errors
     return tl::make_unexpected(tables.error());  // names, options, runs
   }
   auto usable = usable_errors(errors, model);
-  if (!usable) {
-    return tl::make_unexpected(usable.error());
-  }
+  ABBE_TRY(usable);
   const auto layout = common_layout(usable->used, model);
-  if (!layout) {
-    return tl::make_unexpected(layout.error());
-  }
+  ABBE_TRY(layout);
   leave_out_squareness(*usable, *layout);
   const CommonValues values = common_values(usable->used, *layout, model, device);
   auto measured = model_of(*layout, values.measured, model);
@@ -109,9 +104,7 @@ Result<VolumeComparison> compare_in_volume(std::span<const MeasuredError> errors
   const std::vector<Vector3> grid = grid_of(layout->nodes(), model);
   auto difference =
       rigid_free_difference(*measured, *modelled, model.tool_offsets_m().front(), grid);
-  if (!difference) {
-    return tl::make_unexpected(difference.error());
-  }
+  ABBE_TRY(difference);
   VolumeComparison out{.measured = std::move(*measured), .model = std::move(*modelled)};
   out.points = grid.size();
   out.difference = *difference;

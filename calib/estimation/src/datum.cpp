@@ -8,6 +8,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/estimation/null_space.hpp"
+#include "abbe/result/try.hpp"
 #include "column_scale.hpp"
 
 namespace abbe::calib::estimation {
@@ -141,19 +142,13 @@ Result<BorderedTriangle> bordered_triangle(const Information& data, const Eigen:
 }  // namespace
 
 Result<DatumSolution> Datum::solve(const Information& data, const DatumOptions& options) const {
-  if (Result<void> valid = check_solvable(data, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_solvable(data, options));
 
   const Spectrum of_data = spectrum(data, options.zero);
-  if (Result<void> valid = check_rank(data, of_data.rank, K_, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_rank(data, of_data.rank, K_, options));
 
   const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options);
-  if (!bordered) {
-    return tl::unexpected(bordered.error());
-  }
+  ABBE_TRY(bordered);
 
   const Eigen::VectorXd& scale = bordered->scale;
   const auto n = scale.size();
@@ -183,19 +178,13 @@ Result<DatumSolution> Datum::solve(const Information& data, const DatumOptions& 
 
 Result<Eigen::VectorXd> Datum::estimate(const Information& data,
                                         const DatumOptions& options) const {
-  if (Result<void> valid = check_solvable(data, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_solvable(data, options));
 
   const std::size_t rank = pivoted_rank(data, options.zero);
-  if (Result<void> valid = check_rank(data, rank, K_, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_rank(data, rank, K_, options));
 
   const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options);
-  if (!bordered) {
-    return tl::unexpected(bordered.error());
-  }
+  ABBE_TRY(bordered);
 
   Eigen::VectorXd U =
       bordered->scale.asDiagonal() *

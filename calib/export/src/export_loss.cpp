@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "abbe/calib/export/held_correction.hpp"
+#include "abbe/result/try.hpp"
 #include "motion_fit.hpp"
 
 namespace abbe::calib {
@@ -73,7 +74,7 @@ Result<ExportLoss> export_loss(const VolumetricModel& model, const Vector3& tool
   for (const ExportPlace& place : places) {
     const auto c =
         model.command_correction(place.commanded_m, tool_m, travel.value_or(place.travel));
-    if (!c) return tl::make_unexpected(c.error());
+    ABBE_TRY(c);
     const Vector3 difference_m = c->c_m - held(place);
     without += c->c_m.cwiseAbs2();
     lost += difference_m.cwiseAbs2();
@@ -95,7 +96,7 @@ Result<std::vector<ErrorLoss>> losses_by_error(const VolumetricModel& model, con
 
   const GridAxes nodes = loss_nodes(box);
   const auto places = lattice_places(model.validity(), nodes);
-  if (!places) return tl::make_unexpected(places.error());
+  ABBE_TRY(places);
   const std::array<std::size_t, 3> anchors{kLossNodes / 2, kLossNodes / 2, kLossNodes / 2};
   const MotionFit fit(model.chain(), tool_m, motions, nodes, *places, anchors);
   HeldTables held{model.chain(), tool_m, nodes, {}};

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "abbe/calib/export/held_correction.hpp"
+#include "abbe/result/try.hpp"
 #include "motion_fit.hpp"
 
 namespace abbe::calib {
@@ -38,7 +39,7 @@ Result<HeldGrid> grid_of_model(const VolumetricModel& model, const Vector3& tool
       for (const double z : nodes_m[2]) {
         const Vector3 p(x, y, z);
         const auto c = model.command_correction(p, tool_m, travel);
-        if (!c) return tl::make_unexpected(c.error());
+        ABBE_TRY(c);
         grid.c_node_m.push_back(c->c_m);
         grid.inside.push_back(model.validity().contains(p));
       }

@@ -4,6 +4,7 @@
 #include "abbe/calib/export/held_correction.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/geometry/rigid_body_effects.hpp"
+#include "abbe/result/try.hpp"
 #include "motion_fit.hpp"
 
 namespace abbe::calib {
@@ -38,7 +39,7 @@ Result<std::vector<Vector3>> corrections(const VolumetricModel& model, const Vec
   c_m.reserve(places.size());
   for (const LatticePlace& place : places) {
     const auto found = model.command_correction(place.p_m, tool_m, travel);
-    if (!found) return tl::make_unexpected(found.error());
+    ABBE_TRY(found);
     c_m.push_back(found->c_m);
   }
   return c_m;
@@ -77,7 +78,7 @@ Result<void> add_directions(HeldTables& held, const VolumetricModel& model, cons
       if (table.motion.axis == axis) own.push_back(table.motion);
     }
     const auto half_m = half_differences_of(model, held.tool_offset_m, places, axis);
-    if (!half_m) return tl::make_unexpected(half_m.error());
+    ABBE_TRY(half_m);
 
     const MotionFit fit(held.chain, held.tool_offset_m, own, fitted, places, std::nullopt);
     const auto values = fit.fit(*half_m);
@@ -147,9 +148,9 @@ Result<HeldTables> fit_tables(const VolumetricModel& model, const Vector3& tool_
                               bool per_direction) {
   const GridAxes fitted = fitted_nodes(nodes_m);
   const auto places = lattice_places(model.validity(), fitted);
-  if (!places) return tl::make_unexpected(places.error());
+  ABBE_TRY(places);
   const auto c_m = corrections(model, tool_m, *places, {});
-  if (!c_m) return tl::make_unexpected(c_m.error());
+  ABBE_TRY(c_m);
 
   std::array<std::size_t, 3> anchors{};
   for (std::size_t a = 0; a < 3; ++a) {
@@ -164,9 +165,7 @@ Result<HeldTables> fit_tables(const VolumetricModel& model, const Vector3& tool_
   }
 
   if (per_direction && model.travel() != nullptr) {
-    if (auto added = add_directions(held, model, fitted, *places); !added) {
-      return tl::make_unexpected(added.error());
-    }
+    ABBE_TRY(add_directions(held, model, fitted, *places));
   }
   return held;
 }
@@ -176,7 +175,7 @@ Result<HeldTables> tables_of_model(const VolumetricModel& model, const Vector3& 
   const auto* basis = model.tables();
   if (basis == nullptr) {
     const auto layout = ParameterLayout::observable_with_one_target(model.chain(), model.nodes());
-    if (!layout) return tl::make_unexpected(layout.error());
+    ABBE_TRY(layout);
     std::vector<ErrorMotion> motions;
     for (const Table& table : layout->tables()) motions.push_back(table.motion);
     return fit_tables(model, tool_m, motions, nodes_m, false);

@@ -4,6 +4,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/fit/point_set.hpp"
+#include "abbe/result/try.hpp"
 #include "radial_fit.hpp"
 
 namespace abbe::calib::fit {
@@ -16,9 +17,7 @@ Result<Circle> fit_circle(std::span<const Eigen::Vector2d> points,
     in_space.emplace_back(p.x(), p.y(), 0.0);
   }
   const Result<PointSet> set = point_set(in_space, kUnknownsOfCircle, "circle");
-  if (!set) {
-    return tl::unexpected(set.error());
-  }
+  ABBE_TRY(set);
   if (set->on_a_line()) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("circle: the ", points.size(), " points lie on a line (extents ",

@@ -7,6 +7,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/fit/point_set.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 #include "radial_fit.hpp"
 
 namespace abbe::calib::fit {
@@ -137,9 +138,7 @@ double sign_of_direction(const Vector3& z, const std::optional<Vector3>& near) {
 Result<Cylinder> fit_cylinder(std::span<const Vector3> points, std::optional<Vector3> near,
                               std::optional<double> known_sigma) {
   const Result<PointSet> set = point_set(points, kUnknownsOfCylinder, "cylinder");
-  if (!set) {
-    return tl::unexpected(set.error());
-  }
+  ABBE_TRY(set);
   if (set->in_a_plane()) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("cylinder: the ", points.size(), " points lie ",

@@ -4,6 +4,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/fit/point_set.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::fit {
 namespace {
@@ -26,9 +27,7 @@ ResidualStatistics statistics_of_line(const Eigen::Matrix3Xd& across) {
 Result<Line> fit_line(std::span<const Vector3> points, const Vector3& towards,
                       std::optional<double> known_sigma) {
   const Result<PointSet> set = point_set(points, 2, "line");
-  if (!set) {
-    return tl::unexpected(set.error());
-  }
+  ABBE_TRY(set);
 
   const Vector3& extents = set->singular_values;
   if (!(extents(0) - extents(1) > PointSet::kDegenerate * extents(0))) {

@@ -5,6 +5,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/fit/point_set.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::fit {
 
@@ -12,9 +13,7 @@ Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
                         std::optional<double> known_sigma) {
   constexpr std::size_t kUnknowns = 3;
   const Result<PointSet> set = point_set(points, kUnknowns, "plane");
-  if (!set) {
-    return tl::unexpected(set.error());
-  }
+  ABBE_TRY(set);
 
   if (set->on_a_line()) {
     return failure(ErrorCode::DegenerateGeometry,

@@ -2,6 +2,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/fit/point_set.hpp"
+#include "abbe/result/try.hpp"
 #include "radial_fit.hpp"
 
 namespace abbe::calib::fit {
@@ -13,9 +14,7 @@ constexpr std::size_t kUnknowns = 4;
 
 Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double> known_sigma) {
   const Result<PointSet> set = point_set(points, kUnknowns, "sphere");
-  if (!set) {
-    return tl::unexpected(set.error());
-  }
+  ABBE_TRY(set);
 
   if (set->in_a_plane()) {
     return failure(ErrorCode::DegenerateGeometry,

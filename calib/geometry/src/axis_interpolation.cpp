@@ -5,6 +5,7 @@
 
 #include "abbe/calib/geometry/linear_interpolation.hpp"
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -127,9 +128,7 @@ std::optional<Interpolation> table_interpolation(std::string_view text) {
 
 Result<AxisInterpolation> AxisInterpolation::of(std::span<const double> nodes_m,
                                                 Interpolation kind) {
-  if (Result<void> valid = check_nodes(nodes_m); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_nodes(nodes_m));
 
   AxisInterpolation result;
   result.nodes_m_.assign(nodes_m.begin(), nodes_m.end());

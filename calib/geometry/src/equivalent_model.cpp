@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -116,14 +117,10 @@ const CombinedRow& with_share(const std::vector<CombinedRow>& rows, const Polyno
 Result<EquivalentModel> EquivalentModel::of(const KinematicChain& chain, int order,
                                             const Vector3& tool_offset_mm) {
   const Result<ErrorPolynomials> at_zero = ErrorPolynomials::of(chain, order);
-  if (!at_zero) {
-    return tl::unexpected(at_zero.error());
-  }
+  ABBE_TRY(at_zero);
 
   const Result<ErrorPolynomials> A = ErrorPolynomials::of(chain, order, std::array{tool_offset_mm});
-  if (!A) {
-    return tl::unexpected(A.error());
-  }
+  ABBE_TRY(A);
 
   std::vector<CombinedRow> plain = combined_rows(*at_zero), rows = combined_rows(*A);
   for (CombinedRow& row : plain) {
@@ -182,9 +179,7 @@ Result<std::size_t> observable_combinations(const KinematicChain& chain, int ord
   }
 
   const Result<ErrorPolynomials> A = ErrorPolynomials::of(chain, order, scaled);
-  if (!A) {
-    return tl::unexpected(A.error());
-  }
+  ABBE_TRY(A);
 
   const std::vector<CombinedRow> rows = combined_rows(*A);
   Eigen::MatrixXd W(static_cast<Eigen::Index>(rows.size()),

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -107,13 +108,9 @@ std::size_t KinematicChain::place(Axis a) const {
 
 Result<KinematicChain> KinematicChain::parse(std::string_view chain) {
   const Result<std::vector<Token>> found = tokens(chain);
-  if (!found) {
-    return tl::unexpected(found.error());
-  }
+  ABBE_TRY(found);
 
-  if (Result<void> ends = check_ends(chain, *found); !ends) {
-    return tl::unexpected(ends.error());
-  }
+  ABBE_TRY(check_ends(chain, *found));
 
   KinematicChain result;
   result.text_ = std::string(chain);

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -67,9 +68,7 @@ Result<ParameterLayout> ParameterLayout::all_tables(const KinematicChain& chain,
 Result<ParameterLayout> ParameterLayout::with_tables(const KinematicChain& chain,
                                                      MachineNodes nodes,
                                                      std::span<const ErrorMotion> wanted) {
-  if (Result<void> valid = check(nodes); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(nodes));
 
   ParameterLayout layout;
   layout.chain_ = chain;

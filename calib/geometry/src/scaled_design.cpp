@@ -5,6 +5,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "function_value.hpp"
 
 namespace abbe::calib {
@@ -101,9 +102,7 @@ Result<ScaledDesign> ScaledDesign::of(const KinematicChain& chain, int order,
   }
 
   Result<EquivalentModel> equivalent = EquivalentModel::of(chain, order);
-  if (!equivalent) {
-    return tl::unexpected(equivalent.error());
-  }
+  ABBE_TRY(equivalent);
 
   ScaledDesign design;
   design.box_ = box;

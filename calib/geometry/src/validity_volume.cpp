@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "convex_hull.hpp"
 
 namespace abbe::calib {
@@ -44,9 +45,7 @@ ValidityVolume::ValidityVolume(std::vector<Vector3> vertices_m)
     : faces_(hull_faces(vertices_m)), vertices_m_(std::move(vertices_m)) {}
 
 Result<ValidityVolume> ValidityVolume::hull_of(std::span<const Vector3> axis_positions_m) {
-  if (Result<void> finite = check_finite(axis_positions_m); !finite) {
-    return tl::unexpected(finite.error());
-  }
+  ABBE_TRY(check_finite(axis_positions_m));
   const std::vector<Vector3> points = distinct(axis_positions_m);
   std::vector<Vector3> vertices;
   for (const std::size_t i : hull_corners(points, kFlat_m)) {
@@ -56,9 +55,7 @@ Result<ValidityVolume> ValidityVolume::hull_of(std::span<const Vector3> axis_pos
 }
 
 Result<ValidityVolume> ValidityVolume::of_vertices(std::span<const Vector3> vertices_m) {
-  if (Result<void> finite = check_finite(vertices_m); !finite) {
-    return tl::unexpected(finite.error());
-  }
+  ABBE_TRY(check_finite(vertices_m));
   std::vector<Vector3> sorted(vertices_m.begin(), vertices_m.end());
   std::sort(sorted.begin(), sorted.end(), by_coordinates);
   const std::size_t points = sorted.size();

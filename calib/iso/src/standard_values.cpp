@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/result/try.hpp"
 #include "lines.hpp"
 
 namespace abbe::calib::iso {
@@ -123,9 +124,7 @@ const Diagonal* StandardValues::diagonal_of_largest_E() const {
 
 Result<StandardValues> standard_values(const VolumetricModel& model) {
   const Result<LineBox> box = line_box(model.validity());
-  if (!box) {
-    return tl::unexpected(box.error());
-  }
+  ABBE_TRY(box);
 
   const ErrorFunctions functions(model);
   std::array<AxisLine, 3> lines;

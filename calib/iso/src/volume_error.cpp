@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/result/try.hpp"
 #include "error_functions.hpp"
 
 namespace abbe::calib::iso {
@@ -90,9 +91,7 @@ UOfShape u_of_shape(const ErrorFunctions& functions, const LineBox& box, const V
 
 Result<VolumeError> volume_error(const VolumetricModel& model) {
   const Result<LineBox> box = line_box(model.validity());
-  if (!box) {
-    return tl::unexpected(box.error());
-  }
+  ABBE_TRY(box);
 
   constexpr int kPerSide = 11;
   const Vector3 tool_m = model.tool_offsets_m().front();
@@ -121,9 +120,7 @@ Result<VolumeError> volume_error(const VolumetricModel& model) {
   e.rigid_free_mean_U_m = of_shape.mean_m;
   e.rigid_free_max_U_m = of_shape.max_m;
   const Result<ModelDifference> statistics = rigid_free(points_m, V_m);
-  if (!statistics) {
-    return tl::unexpected(statistics.error());
-  }
+  ABBE_TRY(statistics);
   e.mean_m = statistics->as_stated.mean_m;
   e.rms_m = statistics->as_stated.rms_m;
   e.rigid_free_mean_m = statistics->rigid_free.mean_m;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abbe/calib/otf/judge/lack_of_fit.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::joint {
 namespace {
@@ -29,17 +30,13 @@ Result<std::vector<Contribution>> contributions(std::span<const Part> parts,
     std::vector<Part> others(parts.begin(), parts.end());
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
     const Result<std::optional<double>> alone = u_of(parts.subspan(k, 1), common);
-    if (!alone) {
-      return tl::unexpected(alone.error());
-    }
+    ABBE_TRY(alone);
     all.push_back({.u_alone_m = *alone, .u_without_m = {}});
     if (others.empty()) {
       continue;
     }
     const Result<std::optional<double>> without = u_of(others, common);
-    if (!without) {
-      return tl::unexpected(without.error());
-    }
+    ABBE_TRY(without);
     all.back().u_without_m = *without;
   }
   return all;

@@ -13,6 +13,7 @@
 #include "abbe/calib/internal/model/gauge_coordinates.hpp"
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 #include "directed.hpp"
 #include "explanations.hpp"
 
@@ -178,9 +179,7 @@ Result<ValidityVolume> validity_of(std::span<const Part> parts) {
 
 Result<std::vector<PairTest>> test_pairs(std::span<const Part> parts, const CommonTables& common,
                                          const JointOptions& options) {
-  if (Result<void> valid = check_test(parts, common, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_test(parts, common, options));
 
   const GaugeCoordinates c = gauge_coordinates(common.basis);
   const double pairs = 0.5 * static_cast<double>(parts.size() * (parts.size() - 1));
@@ -202,9 +201,7 @@ Result<std::vector<PairTest>> test_pairs(std::span<const Part> parts, const Comm
 }
 
 Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& common) {
-  if (Result<void> valid = check_parts(parts, common, 1); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_parts(parts, common, 1));
 
   const GaugeCoordinates c = gauge_coordinates(common.basis);
   const std::vector<std::string> effects = all_effects(parts);
@@ -228,9 +225,7 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
   }
 
   Result<ValidityVolume> validity = validity_of(parts);
-  if (!validity) {
-    return tl::unexpected(validity.error());
-  }
+  ABBE_TRY(validity);
   const Eigen::VectorXd U = c.N * solved->U.head(m);
   const Eigen::MatrixXd of_e = solved->covariance.topLeftCorner(m, m);
   const Eigen::MatrixXd C = c.N * of_e * c.N.transpose();
@@ -240,9 +235,7 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
           .and_then([&](const VolumetricModel& of_tables) {
             return of_tables.with_misfit(largest_misfit(parts));
           });
-  if (!model) {
-    return tl::unexpected(model.error());
-  }
+  ABBE_TRY(model);
 
   JointModel joint{.model = *std::move(model),
                    .effects = {},
@@ -259,9 +252,7 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
 Result<std::vector<DirectedTest>> test_directions(std::span<const Part> parts,
                                                   const CommonTables& common,
                                                   const JointOptions& options) {
-  if (Result<void> valid = check_test(parts, common, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_test(parts, common, options));
   std::vector<DirectedTest> tests;
   for (DirectedFinding& f : directed_findings(parts, gauge_coordinates(common.basis),
                                               common.basis.layout(), options.false_alarm)) {
@@ -273,9 +264,7 @@ Result<std::vector<DirectedTest>> test_directions(std::span<const Part> parts,
 Result<JointIdentification> identify(std::span<const Part> parts, const CommonTables& common,
                                      const JointOptions& options) {
   Result<std::vector<PairTest>> pairs = test_pairs(parts, common, options);
-  if (!pairs) {
-    return tl::unexpected(pairs.error());
-  }
+  ABBE_TRY(pairs);
 
   const std::vector<DirectedFinding> findings = directed_findings(
       parts, gauge_coordinates(common.basis), common.basis.layout(), options.false_alarm);
@@ -290,9 +279,7 @@ Result<JointIdentification> identify(std::span<const Part> parts, const CommonTa
   }
 
   Result<JointModel> joint = joint_model(parts, common);
-  if (!joint) {
-    return tl::unexpected(joint.error());
-  }
+  ABBE_TRY(joint);
   result.joint = *std::move(joint);
   return result;
 }

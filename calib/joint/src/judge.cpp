@@ -14,6 +14,7 @@
 #include "abbe/calib/internal/model/plausible_scale.hpp"
 #include "abbe/calib/internal/otf/judge/held_out_rows.hpp"
 #include "abbe/calib/otf/judge/judge.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::joint {
 namespace {
@@ -93,9 +94,7 @@ Result<std::optional<VolumetricModel>> model_without_fold(std::span<const Part> 
   if (!joint && joint.error().code == ErrorCode::RankDeficient) {
     return std::nullopt;
   }
-  if (!joint) {
-    return tl::unexpected(joint.error());
-  }
+  ABBE_TRY(joint);
   return std::move(joint->model);
 }
 
@@ -133,13 +132,9 @@ Result<HeldOutFigures> held_out(std::span<const Part> parts, std::span<const Run
 
   otf::HeldOutSums sums;
   for (std::size_t f = 0; f < folds; ++f) {
-    if (Result<void> running = check_stopped(options.stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(options.stopped));
     const auto model = model_without_fold(parts, runs, common, f, options);
-    if (!model) {
-      return tl::unexpected(model.error());
-    }
+    ABBE_TRY(model);
     for (std::size_t k = 0; *model && k < runs.size(); ++k) {
       const otf::Observations& o = *runs[k].run.observations;
       const auto predicted_m = [&](std::size_t row) {
@@ -166,9 +161,7 @@ Result<Verdict> judge(const JointModel& joint, std::span<const Part> parts,
                       const VolumetricModel* active, const GateLimits& limits,
                       const otf::Options& options) {
   const Result<HeldOutFigures> figures = held_out(parts, runs, common, active, options);
-  if (!figures) {
-    return tl::unexpected(figures.error());
-  }
+  ABBE_TRY(figures);
 
   Verdict verdict = decide(joint.model, *figures, limits, active);
   require_plausible_scale(verdict, common_scale_error(joint.model), limits.max_scale_error);

@@ -11,6 +11,7 @@
 #include "abbe/calib/internal/joint/determining_rows.hpp"
 #include "abbe/calib/internal/joint/left_out_rotations.hpp"
 #include "abbe/calib/joint/part.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::joint {
 namespace {
@@ -85,14 +86,10 @@ Result<estimation::Information> information_of_array(const evemu::Observations& 
   }
 
   const auto blocks = evemu::pose_blocks(o, unknowns.design(o.machine.tool_offset_m), options);
-  if (!blocks) {
-    return tl::unexpected(blocks.error());
-  }
+  ABBE_TRY(blocks);
   estimation::Information sum(blocks->front().unknowns.size());
   for (const estimation::Block& block : *blocks) {
-    if (Result<void> added = sum.add(block); !added) {
-      return tl::unexpected(added.error());
-    }
+    ABBE_TRY(sum.add(block));
   }
   return sum;
 }
@@ -218,9 +215,7 @@ Result<Part> array_part(const evemu::Observations& o, const CommonTables& common
   const ArrayUnknowns unknowns(o, common, options);
   Result<estimation::Information> all =
       information_of_array(o, unknowns, noise.s_m, options.linearised_at);
-  if (!all) {
-    return tl::unexpected(all.error());
-  }
+  ABBE_TRY(all);
   if (unknowns.first_error() > unknowns.first_left_out()) {
     all = all->without_unknowns(counted(unknowns.first_left_out(), unknowns.first_error()));
   }

@@ -9,6 +9,7 @@
 #include "abbe/calib/internal/mfb/solve/joint.hpp"
 #include "abbe/calib/joint/part.hpp"
 #include "abbe/calib/model/gauge.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::joint {
 namespace {
@@ -119,9 +120,7 @@ struct BarRows {
 Result<BarRows> rows_of_bar(const mfb::JointSystem& system, const mfb::Observations& o,
                             const CommonTables& common) {
   const Result<Eigen::MatrixXd> all = all_tables_in_gauge(common, o.basis);
-  if (!all) {
-    return tl::unexpected(all.error());
-  }
+  ABBE_TRY(all);
   const mfb::SharedUnknowns& shared = system.shared;
   Eigen::MatrixXd free(shared.parameters(), all->cols());
   for (Eigen::Index k = 0; k < free.cols(); ++k) {

@@ -11,6 +11,7 @@
 #include "abbe/calib/internal/model/gauge_coordinates.hpp"
 #include "abbe/calib/internal/model/offset_of_data.hpp"
 #include "abbe/calib/joint/part.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::joint {
 namespace {
@@ -186,12 +187,8 @@ Eigen::MatrixXd whitened_by(const ScaledTriangle& t, const Eigen::MatrixXd& M) {
 
 Result<Part> part_of_run(std::string name, const VolumetricModel& model, const CommonTables& common,
                          const CommonEffects& effects) {
-  if (Result<void> same = check_same_layout(name, model, common); !same) {
-    return tl::unexpected(same.error());
-  }
-  if (Result<void> valid = check_offset(name, effects, common); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_same_layout(name, model, common));
+  ABBE_TRY(check_offset(name, effects, common));
 
   const Eigen::MatrixXd N = gauge_coordinates(common.basis).N;
   SharedColumns shared = shared_columns(common.basis.layout(), effects);
@@ -199,9 +196,7 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
   const Result<ScaledTriangle> triangle =
       triangle_without_effects(name, N.transpose() * model.covariance() * N,
                                N.transpose() * shared.in_covariance, shared.names);
-  if (!triangle) {
-    return tl::unexpected(triangle.error());
-  }
+  ABBE_TRY(triangle);
 
   const LeftOutRotations left_out(common, model.tool_offsets_m().front() - common.tool_offset_m);
   const Result<Eigen::MatrixXd> of_rotations = left_out.of_parameters();

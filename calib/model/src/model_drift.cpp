@@ -12,6 +12,7 @@
 #include "abbe/calib/internal/model/gauge_coordinates.hpp"
 #include "abbe/calib/internal/statistics/chi2_tail.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -348,14 +349,10 @@ Result<DriftTest> test_drift(const VolumetricModel& run, const VolumetricModel& 
     return failure(ErrorCode::BadInput, message("drift: false-alarm probability ",
                                                 options.false_alarm, " must be in (0, 1)"));
   }
-  if (Result<void> same = check_same_parameters(run, active); !same) {
-    return tl::unexpected(same.error());
-  }
+  ABBE_TRY(check_same_parameters(run, active));
 
   const Result<WhitenedDifference> d = whitened_difference(run, active);
-  if (!d) {
-    return tl::unexpected(d.error());
-  }
+  ABBE_TRY(d);
 
   const ParameterLayout& layout = run.tables()->layout();
   const std::vector<GaugeGroup>& groups = d->coordinates.groups;

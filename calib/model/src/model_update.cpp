@@ -14,6 +14,7 @@
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/internal/model/offset_of_data.hpp"
 #include "abbe/calib/model/model_drift.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -212,9 +213,7 @@ std::vector<Eigen::Index> free_coordinates_of(const GaugeCoordinates& c,
 Result<ModelWithOffset> update_model(const ModelWithOffset& before, const ModelWithOffset& now,
                                      const UpdateOptions& options) {
   const VolumetricModel &previous = before.model, &run = now.model;
-  if (Result<void> same = check_same_parameters(previous, run); !same) {
-    return tl::unexpected(same.error());
-  }
+  ABBE_TRY(check_same_parameters(previous, run));
 
   if (previous.travel() != nullptr || run.travel() != nullptr) {
     return failure(ErrorCode::NotApplicable,
@@ -225,12 +224,8 @@ Result<ModelWithOffset> update_model(const ModelWithOffset& before, const ModelW
 
   const ParameterLayout& layout = run.tables()->layout();
   const GaugeCoordinates c = gauge_coordinates(*run.tables());
-  if (Result<void> valid = check_update_options(options, c); !valid) {
-    return tl::unexpected(valid.error());
-  }
-  if (Result<void> valid = check_offsets(before, now); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_update_options(options, c));
+  ABBE_TRY(check_offsets(before, now));
 
   const Eigen::MatrixXd& N = c.N;
   const Eigen::MatrixXd G = common_part(c, layout, options);
@@ -259,9 +254,7 @@ Result<ModelWithOffset> update_model(const ModelWithOffset& before, const ModelW
     added =
         update.add_model(C_run, N.transpose() * run.U(), of_run, free_coordinates_of(c, {}), "new");
   }
-  if (!added) {
-    return tl::unexpected(added.error());
-  }
+  ABBE_TRY(added);
   update.add_offset(0.0, of_previous ? before.range_offset->u_prior_m : d_scale_m);
   const auto add_data = [&](const OffsetInModel& offset, double factor) {
     if (const std::optional<OffsetOfData> data = of_data(offset)) {

@@ -7,6 +7,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/model/volumetric_model.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -110,9 +111,7 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
     return failure(design.error().code, message("model: ", design.error().text));
   }
 
-  if (Result<void> valid = check_names(d.parameters, design->equivalent().names()); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_names(d.parameters, design->equivalent().names()));
 
   if (d.tool_offsets_m.size() != 1) {
     return failure(ErrorCode::BadInput,
@@ -126,9 +125,7 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
   }
 
   Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
-  if (!validity) {
-    return tl::unexpected(validity.error());
-  }
+  ABBE_TRY(validity);
 
   return PolynomialModel::of(*std::move(design), d.polynomials->ball1_m, std::move(c_m),
                              d.covariance)
@@ -149,9 +146,7 @@ Result<VolumetricModel> tables_from(const ModelDescription& d) {
   const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(n);
   const std::vector<Parameter> expected = named(*layout, zeros, Eigen::MatrixXd::Zero(n, n));
 
-  if (Result<void> valid = check_parameters(d.parameters, expected); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_parameters(d.parameters, expected));
 
   Eigen::VectorXd U(n);
   for (std::size_t i = 0; i < d.parameters.size(); ++i) {
@@ -159,9 +154,7 @@ Result<VolumetricModel> tables_from(const ModelDescription& d) {
   }
 
   Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
-  if (!validity) {
-    return tl::unexpected(validity.error());
-  }
+  ABBE_TRY(validity);
 
   return VolumetricModel::from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance,
                                       *std::move(validity), d.interpolation);
@@ -170,9 +163,7 @@ Result<VolumetricModel> tables_from(const ModelDescription& d) {
 }  // namespace
 
 Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
-  if (Result<void> valid = check_covariance(d.covariance); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_covariance(d.covariance));
 
   Result<VolumetricModel> model = d.polynomials ? polynomials_from(d) : tables_from(d);
   if (model && d.misfit) {

@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/geometry/rigid_body_effects.hpp"
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/model/volumetric_model.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -32,9 +33,7 @@ Result<void> check(const Misfit& misfit, const VolumetricModel& model) {
 }  // namespace
 
 Result<VolumetricModel> VolumetricModel::with_misfit(Misfit misfit) const {
-  if (Result<void> valid = check(misfit, *this); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(misfit, *this));
   VolumetricModel model = *this;
   model.misfit_.reset();
   if (misfit.any()) {

@@ -10,6 +10,7 @@
 #include "abbe/calib/internal/geometry/cell_form.hpp"
 #include "abbe/calib/internal/geometry/checked_nodes.hpp"
 #include "abbe/calib/internal/model/tool_span.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -128,9 +129,7 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
     return failure(ErrorCode::NotFinite, "model: a parameter is not a number");
   }
 
-  if (Result<void> valid = check_shape(covariance, layout.model_size()); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_shape(covariance, layout.model_size()));
 
   if (tool_offsets_m.empty()) {
     return failure(ErrorCode::BadInput, "model: no tool offset given");
@@ -152,9 +151,7 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
       gauge == Gauge::G1 ? Vector3(Vector3::Zero()) : reference_position_m(layout.nodes());
   Result<TableBasis> basis = TableBasis::of(layout.with_squareness_from(squareness_from_m),
                                             TableOptions::all_axes(interpolation));
-  if (!basis) {
-    return tl::unexpected(basis.error());
-  }
+  ABBE_TRY(basis);
 
   VolumetricModel model(*std::move(basis),
                         cubic ? checked_nodes_of_cubic(layout.nodes()) : layout.nodes());

@@ -4,6 +4,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/geometry/effect_of_travel.hpp"
 #include "abbe/calib/model/volumetric_model.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -55,12 +56,8 @@ Result<VolumetricModel> VolumetricModel::with_travel(TravelDifferences differenc
   TableOptions options = tables()->options();
   options.travel = differences.kind;
   Result<TableBasis> basis = TableBasis::of(tables()->layout(), options);
-  if (!basis) {
-    return tl::unexpected(basis.error());
-  }
-  if (Result<void> valid = check_sizes(differences, *basis); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(basis);
+  ABBE_TRY(check_sizes(differences, *basis));
 
   VolumetricModel model = *this;
   Eigen::VectorXd U_and_D(U_.size() + differences.D.size());

@@ -8,6 +8,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/statistics/student_tail.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::probe {
 namespace {
@@ -116,9 +117,9 @@ Scatter scatter_of(const std::vector<Feed>& feeds) {
 }  // namespace
 
 Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayOptions& options) {
-  if (auto valid = check(touches); !valid) return tl::unexpected(valid.error());
+  ABBE_TRY(check(touches));
   const auto feeds = group(touches, options);
-  if (!feeds) return tl::unexpected(feeds.error());
+  ABBE_TRY(feeds);
   if (feeds->size() < kLeastFeeds) {
     return failure(
         ErrorCode::TooFewObservations,

@@ -6,6 +6,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/statistics/singular_values.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::probe {
 namespace {
@@ -99,7 +100,7 @@ EffectiveRadius LobingMap::at(const Vector3& normal) const {
 
 Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
                               const QualificationOptions& options) {
-  if (auto valid = check(touches); !valid) return tl::unexpected(valid.error());
+  ABBE_TRY(check(touches));
   Unknowns x = Unknowns::Zero();
   x.head<3>() = first_centre(touches, options.sphere_radius_m);
   Qualification q;

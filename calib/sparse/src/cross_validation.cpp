@@ -8,6 +8,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 #include "held_out.hpp"
 #include "lane_batch.hpp"
 #include "path_setup.hpp"
@@ -44,7 +45,7 @@ Result<std::vector<Penalty>> penalties(PenaltyKind kind, const std::vector<doubl
   std::vector<Penalty> out;
   for (const double g : gamma) {
     out.push_back({kind, g});
-    if (auto checked = check(out.back()); !checked) return tl::unexpected(checked.error());
+    ABBE_TRY(check(out.back()));
   }
   if (out.empty()) return failure(ErrorCode::BadInput, "grid search: no gamma");
   return out;
@@ -137,7 +138,7 @@ Result<GridSearch> search(const GramProblem& problem, const std::vector<Penalty>
 
   std::vector<HeldOut> judged;
   for (Result<HeldOut>& fold : held_out) {
-    if (!fold) return tl::unexpected(fold.error());
+    ABBE_TRY(fold);
     judged.push_back(std::move(*fold));
   }
 
@@ -171,9 +172,9 @@ Result<GridSearch> grid_search(const Eigen::MatrixXd& X, const Eigen::VectorXd& 
                                const std::vector<double>& gamma, const Folds& folds,
                                const PathOptions& options, const ParallelFor& parallel_for) {
   const auto wanted = penalties(kind, gamma);
-  if (!wanted) return tl::unexpected(wanted.error());
-  if (auto checked = check(options); !checked) return tl::unexpected(checked.error());
-  if (auto checked = check(folds, X.rows()); !checked) return tl::unexpected(checked.error());
+  ABBE_TRY(wanted);
+  ABBE_TRY(check(options));
+  ABBE_TRY(check(folds, X.rows()));
   return gram_problem(X, y).and_then([&](const GramProblem& problem) {
     return search(problem, *wanted, folds, options, parallel_for);
   });

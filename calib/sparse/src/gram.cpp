@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::sparse {
 namespace {
@@ -29,9 +30,9 @@ Result<void> check_shapes(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
 }  // namespace
 
 Result<GramProblem> gram_problem(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
-  if (auto checked = check_shapes(X, y); !checked) return tl::unexpected(checked.error());
+  ABBE_TRY(check_shapes(X, y));
   auto design = standardise(X);
-  if (!design) return tl::unexpected(design.error());
+  ABBE_TRY(design);
   GramProblem problem;
   problem.design = std::move(*design);
   problem.y_mean = y.mean();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "gram.hpp"
 
 namespace abbe::calib::sparse {
@@ -20,7 +21,7 @@ struct Fitted {
 
 Result<Fitted> fitted(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Penalty& penalty,
                       const Eigen::VectorXd& b) {
-  if (auto checked = check(penalty); !checked) return tl::unexpected(checked.error());
+  ABBE_TRY(check(penalty));
   if (b.size() != X.cols()) {
     return failure(ErrorCode::BadInput, message("check of a solution: ", b.size(),
                                                 " coefficients for ", X.cols(), " columns"));

@@ -7,6 +7,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/sparse/cross_validation.hpp"
+#include "abbe/result/try.hpp"
 #include "lane_batch.hpp"
 #include "path_setup.hpp"
 
@@ -117,8 +118,8 @@ Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X, const Eigen
 
 Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Penalty& penalty,
                       const PathOptions& options) {
-  if (auto checked = check(penalty); !checked) return tl::unexpected(checked.error());
-  if (auto checked = check(options); !checked) return tl::unexpected(checked.error());
+  ABBE_TRY(check(penalty));
+  ABBE_TRY(check(options));
   return gram_problem(X, y).map([&](const GramProblem& problem) {
     const LambdaList lambda = lambda_list(problem, options);
     const std::array task{path_task(problem, penalty, lambda, options)};

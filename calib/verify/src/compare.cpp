@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/verify/interpolation.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::verify {
 namespace {
@@ -30,9 +31,7 @@ Vector3 mean_of(std::span<const Vector3> v) {
 Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
                                             std::span<const Vector3> wanted_m) {
   const auto T = fit_rigid(measured_m, wanted_m);
-  if (!T) {
-    return tl::make_unexpected(T.error());
-  }
+  ABBE_TRY(T);
   std::vector<Vector3> left;
   for (std::size_t i = 0; i < wanted_m.size(); ++i) {
     left.emplace_back(*T * measured_m[i] - wanted_m[i]);
@@ -88,9 +87,7 @@ struct WeightedPlaces {
 Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricModel& model,
                                        const Comparison& c) {
   const auto box = bounding_box(model.validity().vertices_m());
-  if (auto valid = check_step(box, c); !valid) {
-    return tl::make_unexpected(valid.error());
-  }
+  ABBE_TRY(check_step(box, c));
 
   std::vector<Vector3> wanted = grid_places(model, box, c);
   if (c.origin_m) {
@@ -98,9 +95,7 @@ Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricMo
   }
 
   const auto weights = linear_weights(o.readings_m, wanted);
-  if (!weights) {
-    return tl::make_unexpected(weights.error());
-  }
+  ABBE_TRY(weights);
 
   if (c.origin_m && !weights->back()) {
     return failure(ErrorCode::DegenerateGeometry,
@@ -165,9 +160,7 @@ std::vector<Vector3> modelled(const VolumetricModel& model, const Vector3& tool_
 Result<void> fill_grid(const Observations& o, const VolumetricModel& model, const Vector3& tool_m,
                        Comparison& out) {
   const auto places = weighted_places(o, model, out);
-  if (!places) {
-    return tl::make_unexpected(places.error());
-  }
+  ABBE_TRY(places);
 
   const bool has_origin = out.origin_m.has_value();
   const auto las = relative(interpolated(*places, o.V_m), has_origin);
@@ -209,9 +202,7 @@ Result<void> fit_model_to_V_las(Comparison& c) {
     c.turned.tail<3>() = N.ldlt().solve(moment);
   } else {
     const auto fitted = rigid_free(places, difference);
-    if (!fitted) {
-      return tl::make_unexpected(fitted.error());
-    }
+    ABBE_TRY(fitted);
     c.turned = fitted->rigid;
   }
 
@@ -365,13 +356,9 @@ Result<Comparison> compare(const Observations& o, const VolumetricModel& model,
 
   Comparison c = std::move(*at_points);
   set_options(c, model, options);
-  if (auto done = fill_grid(o, model, tool_offset_m, c); !done) {
-    return tl::make_unexpected(done.error());
-  }
+  ABBE_TRY(fill_grid(o, model, tool_offset_m, c));
 
-  if (auto done = fit_model_to_V_las(c); !done) {
-    return tl::make_unexpected(done.error());
-  }
+  ABBE_TRY(fit_model_to_V_las(c));
 
   compute_ratios(c);
   return c;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "extent.hpp"
 
 namespace abbe::calib::verify {
@@ -182,9 +183,7 @@ LinearWeights weights_in(const Cell& cell, const Vector4& place, const Programme
 Result<std::vector<std::optional<LinearWeights>>> linear_weights(std::span<const Vector3> points,
                                                                  std::span<const Vector3> places) {
   const auto extent = extent_of(points);
-  if (!extent) {
-    return tl::make_unexpected(extent.error());
-  }
+  ABBE_TRY(extent);
 
   const Programme programme(points, *extent);
   std::vector<Cell> found;  // a cell is valid for every place inside it

@@ -6,6 +6,7 @@
 #include "abbe/calib/geometry/axis_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/result/try.hpp"
 #include "extent.hpp"
 
 namespace abbe::calib::verify {
@@ -164,9 +165,7 @@ std::size_t Observations::shot_count() const noexcept {
 }
 
 Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame) {
-  if (auto finite = check_finite(points); !finite) {
-    return tl::make_unexpected(finite.error());
-  }
+  ABBE_TRY(check_finite(points));
 
   Observations o;
   o.frame = frame;
@@ -178,15 +177,11 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
   }
 
   const auto extent = extent_of(o.readings_m);
-  if (!extent) {
-    return tl::make_unexpected(extent.error());
-  }
+  ABBE_TRY(extent);
 
   if (frame == Frame::BestFit) {
     const auto T = fit_rigid(o.measured_m, o.readings_m);
-    if (!T) {
-      return tl::make_unexpected(T.error());
-    }
+    ABBE_TRY(T);
     o.T_machine_tracker = *T;
   }
 
@@ -195,9 +190,7 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
   }
   o.repeatability_m = repeatability_m(points, o);
 
-  if (auto fits = check_lack_of_fit(o, points, *extent); !fits) {
-    return tl::make_unexpected(fits.error());
-  }
+  ABBE_TRY(check_lack_of_fit(o, points, *extent));
 
   return o;
 }

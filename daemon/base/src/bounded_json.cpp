@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -64,7 +66,7 @@ std::string cause_of(const json::exception& exception) {
 }
 
 Result<json> parse_json(std::string_view text, std::string_view what, const JsonBounds& bounds) {
-  if (auto valid = check_json(text, what, bounds); !valid) return tl::unexpected(valid.error());
+  ABBE_TRY(check_json(text, what, bounds));
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {

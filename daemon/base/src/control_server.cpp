@@ -27,6 +27,7 @@
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/control_server.hpp"
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/result/try.hpp"
 #include "json_line.hpp"
 #include "long_requests.hpp"
 
@@ -397,7 +398,7 @@ Result<std::unique_ptr<ControlServer>> ControlServer::open(const std::filesystem
                                                            Handler handler,
                                                            const ControlLimits& limits) {
   auto listener = listen_unix(socket_path);
-  if (!listener) return tl::unexpected(listener.error());
+  ABBE_TRY(listener);
   return serve_control(std::move(*listener), socket_path, std::move(handler), limits);
 }
 

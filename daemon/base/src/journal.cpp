@@ -14,6 +14,7 @@
 #include "abbe/base/file_descriptor.hpp"
 #include "abbe/base/unix_socket.hpp"
 #include "abbe/protocol/printable.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -90,7 +91,7 @@ bool stderr_leads_to_journal() {
 
 Result<std::unique_ptr<JournalSink>> native_journal(const std::filesystem::path& socket) {
   auto connected = connect_unix_datagrams(socket);
-  if (!connected) return tl::unexpected(connected.error());
+  ABBE_TRY(connected);
   set_send_time_out(connected->get(), kJournalSendTimeOut);
   return std::make_unique<NativeJournal>(std::move(*connected));
 }

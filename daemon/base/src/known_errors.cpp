@@ -4,6 +4,7 @@
 
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -18,7 +19,7 @@ Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file)
                                     {"uy_um", false},
                                     {"uz_um", false},
                                     {"inside", false}}});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   KnownErrorsFile errors{parsed->source, {}, {}};

@@ -4,13 +4,14 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
 Result<ParsedTable> parse_table(const std::filesystem::path& file,
                                 const std::vector<TableForm>& forms, const ReadProgress& progress) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_table(*text, file, forms, progress);
 }
 

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "abbe/base/file_descriptor.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -129,7 +130,7 @@ namespace {
 Result<void> create_missing(const std::filesystem::path& folder, NewFolder kind) {
   std::error_code error;
   if (folder.empty() || std::filesystem::is_directory(folder, error)) return {};
-  if (auto above = create_missing(folder.parent_path(), kind); !above) return above;
+  ABBE_TRY(create_missing(folder.parent_path(), kind));
   if (::mkdir(folder.c_str(), 0777) != 0)
     return errno == EEXIST ? Result<void>{} : io_failure("create", folder);
   if (kind == NewFolder::OfTheCaller) return {};
@@ -149,7 +150,7 @@ Result<void> create_missing(const std::filesystem::path& folder, NewFolder kind)
 }  // namespace
 
 Result<void> create_folder(const std::filesystem::path& folder, NewFolder kind) {
-  if (auto made = create_missing(folder, kind); !made) return made;
+  ABBE_TRY(create_missing(folder, kind));
   std::error_code error;
   if (folder.empty() || std::filesystem::is_directory(folder, error)) return {};
   errno = ENOTDIR;

@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -42,7 +44,7 @@ void set_send_time_out(int fd, std::chrono::milliseconds time_out) noexcept {
 Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
                                     std::chrono::milliseconds time_out) {
   auto address = address_of(path);
-  if (!address) return tl::unexpected(address.error());
+  ABBE_TRY(address);
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
   if (!fd) return tl::unexpected(failed("connect", path));
 
@@ -64,7 +66,7 @@ Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
 
 Result<FileDescriptor> connect_unix_datagrams(const std::filesystem::path& path) {
   const auto address = address_of(path);
-  if (!address) return tl::unexpected(address.error());
+  ABBE_TRY(address);
   FileDescriptor fd{::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)};
   const auto* generic = reinterpret_cast<const sockaddr*>(&*address);
   if (!fd || ::connect(fd.get(), generic, sizeof *address) != 0)
@@ -82,7 +84,7 @@ bool is_listened_at(const std::filesystem::path& path) {
 
 Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
   auto address = address_of(path);
-  if (!address) return tl::unexpected(address.error());
+  ABBE_TRY(address);
   if (is_listened_at(path)) {
     return tl::unexpected(
         Error{ErrorCode::Io,

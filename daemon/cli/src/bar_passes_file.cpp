@@ -6,6 +6,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -56,9 +57,9 @@ Result<BarPassesFile> BarPassesFile::open(std::filesystem::path file, const mfb:
                             "another -o",
                             passes.file_.string()));
   auto text = read_regular_file(passes.file_);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
   passes.text_ = *std::move(text);
-  if (auto whole = passes.count_rows(bar); !whole) return tl::unexpected(whole.error());
+  ABBE_TRY(passes.count_rows(bar));
   return passes;
 }
 

@@ -18,6 +18,7 @@
 #include "abbe/calib/evemu/plan/artefact_touches.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
@@ -48,7 +49,7 @@ struct Placed {
 
 Result<Placed> placed(const CalibrateArtefactArguments& arguments) {
   const auto file = read_calibrator_toml(arguments.calibrator);
-  if (!file) return tl::unexpected(file.error());
+  ABBE_TRY(file);
   const double turn_rad = arguments.turn_deg * std::numbers::pi / 180.0;
   const auto& at = arguments.at_mm;
   const calib::RigidTransform T_machine_artefact{
@@ -82,7 +83,7 @@ Result<Touched> touch_artefact(const std::filesystem::path& socket,
                                const evemu::ArtefactPlan& plan) {
   const auto made =
       make_touches(socket, {{plan.touches.begin(), plan.touches.end()}, plan.leave_m});
-  if (!made) return tl::unexpected(made.error());
+  ABBE_TRY(made);
   Touched out{{}, made->u_position_m, made->reason, made->code};
   for (std::size_t i = 0; i < made->places_m.size(); ++i)
     out.touches.push_back({.position = 1,

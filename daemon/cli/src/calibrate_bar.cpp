@@ -22,6 +22,7 @@
 #include "abbe/calib/mfb/plan/pass_on_machine.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/gauge_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "bar_passes_file.hpp"
@@ -54,11 +55,11 @@ struct BarToCalibrate {
 
 Result<BarToCalibrate> read_files(const IdentifyBarArguments& files) {
   auto bar = read_bar_toml(files.bar);
-  if (!bar) return tl::unexpected(bar.error());
+  ABBE_TRY(bar);
   auto plan = read_bar_plan_toml(files.plan, bar->bar);
-  if (!plan) return tl::unexpected(plan.error());
+  ABBE_TRY(plan);
   auto gauge = read_gauge_to_measure(files.gauge);
-  if (!gauge) return tl::unexpected(gauge.error());
+  ABBE_TRY(gauge);
   return BarToCalibrate{*std::move(bar), *std::move(plan), *std::move(gauge)};
 }
 
@@ -106,7 +107,7 @@ Result<void> check_measured_gauge(const CalibrateBarArguments& arguments, const 
                             "another -o",
                             file.string()));
   const auto measured = read_gauge_toml(file);
-  if (!measured) return tl::unexpected(measured.error());
+  ABBE_TRY(measured);
   if (same_gauge(measured->gauge, given.gauge)) return {};
   return fail(
       ErrorCode::BadInput,
@@ -161,11 +162,11 @@ class BarCalibration {
     for (std::size_t m = 0; m < measurements.size(); ++m) {
       if (points_.has(measurements[m].name)) continue;
       if (arguments_.at_most != 0 && done++ == arguments_.at_most) return false;
-      if (auto made = touch_pass(m); !made) return tl::unexpected(made.error());
+      ABBE_TRY(touch_pass(m));
     }
     if (has_readings(what_.gauge.gauge) || fs::exists(gauge_file())) return true;
     if (arguments_.at_most != 0 && done == arguments_.at_most) return false;
-    if (auto made = touch_gauge(); !made) return tl::unexpected(made.error());
+    ABBE_TRY(touch_gauge());
     return true;
   }
 
@@ -193,11 +194,11 @@ class BarCalibration {
     if (!ready) return ready;
 
     const auto tip_m = machine_position(socket_);
-    if (!tip_m) return tl::unexpected(tip_m.error());
+    ABBE_TRY(tip_m);
     const auto pass = mfb::pass_on_machine(what_.bar.bar, plan, index, *tip_m, touch_options());
     if (!pass) return tl::unexpected(error_of(pass.error()));
     const auto made = make_touches(socket_, pass->made);
-    if (!made) return tl::unexpected(made.error());
+    ABBE_TRY(made);
 
     mfb::PassTouches touches;
     for (std::size_t i = 0; i < made->places_m.size(); ++i)
@@ -217,7 +218,7 @@ class BarCalibration {
   [[nodiscard]] Result<mfb::Measurement> bar_as_it_lay() const {
     const auto touches = read_bar_points_csv(points_.file(), what_.bar.bar, what_.plan,
                                              nodes_of_measuring_machine());
-    if (!touches) return tl::unexpected(touches.error());
+    ABBE_TRY(touches);
     const auto direction = mfb::direction_of_bar(what_.bar.bar, what_.plan.plan, touches->passes);
     if (!direction) return tl::unexpected(error_of(direction.error()));
     mfb::Measurement m = what_.plan.plan.measurements.front();
@@ -229,7 +230,7 @@ class BarCalibration {
   [[nodiscard]] Result<void> touch_gauge() {
     mfb::StepGauge gauge = what_.gauge.gauge;
     const auto normal = bar_as_it_lay();
-    if (!normal) return tl::unexpected(normal.error());
+    ABBE_TRY(normal);
     const auto ready = wait_for_operator(
         fmt::format("step gauge {}: put it where the bar was, along ({}) {}, the centre of the tip "
                     "on its first face at ({}) mm, within 1 mm.",
@@ -239,12 +240,12 @@ class BarCalibration {
     if (!ready) return ready;
 
     const auto tip_m = machine_position(socket_);
-    if (!tip_m) return tl::unexpected(tip_m.error());
+    ABBE_TRY(tip_m);
     const auto touches =
         mfb::gauge_on_machine(gauge, *normal, arguments_.gauge_runs, *tip_m, touch_options());
     if (!touches) return tl::unexpected(error_of(touches.error()));
     const auto made = make_touches(socket_, *touches);
-    if (!made) return tl::unexpected(made.error());
+    ABBE_TRY(made);
     if (!made->reason.empty())
       return fail(made->code,
                   fmt::format("step gauge: {}; --continue touches it again", made->reason));

@@ -12,6 +12,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/methods/evemu/task_of_files.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "commands.hpp"
 #include "follow_calibration.hpp"
@@ -29,11 +30,11 @@ struct CalibrateEvemuArguments {
 
 Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
-  if (!calibrator) return tl::make_unexpected(calibrator.error());
+  ABBE_TRY(calibrator);
   std::optional<BallErrorsFile> reference;
   if (!arguments.reference.empty()) {
     auto read = read_errors_csv(arguments.reference);
-    if (!read) return tl::make_unexpected(read.error());
+    ABBE_TRY(read);
     reference = std::move(*read);
   }
 

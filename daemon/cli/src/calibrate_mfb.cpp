@@ -13,6 +13,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/methods/calibration_request.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
 #include "follow_calibration.hpp"
@@ -29,27 +30,26 @@ struct CalibrateMfbArguments {
 
 Result<MfbRequest::File> file_with_text(const std::string& file) {
   auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return MfbRequest::File{std::filesystem::path(file).filename().string(), std::move(*text)};
 }
 
 /// Bar and plan are checked here, too, so that the message names the files as they were given.
 Result<MfbRequest> request_of_files(const CalibrateMfbArguments& arguments) {
   auto bar_file = file_with_text(arguments.bar);
-  if (!bar_file) return tl::make_unexpected(bar_file.error());
+  ABBE_TRY(bar_file);
   const auto bar = parse_bar_toml(bar_file->text, arguments.bar);
-  if (!bar) return tl::make_unexpected(bar.error());
+  ABBE_TRY(bar);
   auto plan_file = file_with_text(arguments.plan);
-  if (!plan_file) return tl::make_unexpected(plan_file.error());
-  if (const auto plan = parse_bar_plan_toml(plan_file->text, arguments.plan, bar->bar); !plan)
-    return tl::make_unexpected(plan.error());
+  ABBE_TRY(plan_file);
+  ABBE_TRY(parse_bar_plan_toml(plan_file->text, arguments.plan, bar->bar));
   return MfbRequest{std::move(*bar_file), std::move(*plan_file), {}};
 }
 
 /// The touches of an interrupted session, with its bar and plan.
 Result<MfbRequest> request_of_recording(const CalibrateMfbArguments& arguments) {
   const auto recording = open_recording(arguments.recording);
-  if (!recording) return tl::make_unexpected(recording.error());
+  ABBE_TRY(recording);
   return bar_request_to_continue(*recording);
 }
 

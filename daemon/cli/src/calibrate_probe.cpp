@@ -19,6 +19,7 @@
 #include "abbe/calib/probe/observe.hpp"
 #include "abbe/config/linear_axes.hpp"
 #include "abbe/recording/recording_reader.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "terminal.hpp"
 
@@ -50,7 +51,7 @@ struct Touches {
 
 Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
   const auto recording = RecordingReader::open(arguments.recording);
-  if (!recording) return tl::unexpected(recording.error());
+  ABBE_TRY(recording);
   Touches touches{{}, recording->damage()};
   RecordingSink sink;
   sink.probe_trigger = [&](const ProbeTrigger& t, std::string_view) {
@@ -59,7 +60,7 @@ Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
                               {t.velocity[0], t.velocity[1], t.velocity[2]}});
   };
   (void)recording->read(sink);
-  if (auto intact = recording->intact(); !intact) return tl::unexpected(intact.error());
+  ABBE_TRY(recording->intact());
   return touches;
 }
 

@@ -1,6 +1,7 @@
 #include "certificate_file.hpp"
 
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "abbe/settings/section.hpp"
 
@@ -78,9 +79,9 @@ void read_equipment(Section& root, CertificateDetails& out) {
 
 Result<CertificateDetails> read_certificate_toml(const std::filesystem::path& file) {
   const auto text = read_regular_file(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   const auto table = parse_toml(*text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
 
   Faults faults(file.string());
   Section root(&*table, "", {1, 1}, faults);

@@ -8,6 +8,7 @@
 #include <CLI/Formatter.hpp>
 
 #include "abbe/config/config.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -21,7 +22,7 @@ void add_socket_options(CLI::App& command, DaemonSocket& where) {
 Result<std::filesystem::path> socket_path(const DaemonSocket& where) {
   if (where.config.empty()) return std::filesystem::path{where.socket};
   auto config = load_config(where.config);
-  if (!config) return tl::unexpected(config.error());
+  ABBE_TRY(config);
   return config->control.socket;
 }
 

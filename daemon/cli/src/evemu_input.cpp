@@ -15,6 +15,7 @@
 #include "abbe/methods/evemu/identification.hpp"
 #include "abbe/methods/evemu/method.hpp"
 #include "abbe/recording/recorded_clock.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/touches_not_seen.hpp"
 #include "abbe/tables/travel_faults.hpp"
@@ -75,19 +76,15 @@ tl::unexpected<Error> in_file(const std::string& file, const calib::Error& error
 Result<void> observe_touches(const EvemuInputArguments& arguments, const evemu::Machine& machine,
                              const evemu::ObserveOptions& options, EvemuInput& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
-  if (!calibrator) return tl::make_unexpected(calibrator.error());
-  if (auto valid = check_artefact(arguments, calibrator->calibrator,
-                                  options.artefact_temperature.has_value(),
-                                  missing_array_sensor(arguments, input.config));
-      !valid)
-    return valid;
+  ABBE_TRY(calibrator);
+  ABBE_TRY(check_artefact(arguments, calibrator->calibrator,
+                          options.artefact_temperature.has_value(),
+                          missing_array_sensor(arguments, input.config)));
 
   const auto touches = read_touches_csv(arguments.touches);
-  if (!touches) return tl::make_unexpected(touches.error());
-  if (auto inside = check_travel(arguments.touches, positions_of(touches->touches), touches->lines,
-                                 input.config.machine);
-      !inside)
-    return inside;
+  ABBE_TRY(touches);
+  ABBE_TRY(check_travel(arguments.touches, positions_of(touches->touches), touches->lines,
+                        input.config.machine));
 
   input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
   auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
@@ -102,11 +99,9 @@ Result<void> observe_touches(const EvemuInputArguments& arguments, const evemu::
 Result<void> observe_errors(const EvemuInputArguments& arguments, const evemu::Machine& machine,
                             const evemu::ObserveOptions& options, EvemuInput& input) {
   const auto errors = read_errors_csv(arguments.errors);
-  if (!errors) return tl::make_unexpected(errors.error());
-  if (auto inside = check_travel(arguments.errors, positions_of(errors->errors), errors->lines,
-                                 input.config.machine);
-      !inside)
-    return inside;
+  ABBE_TRY(errors);
+  ABBE_TRY(check_travel(arguments.errors, positions_of(errors->errors), errors->lines,
+                        input.config.machine));
 
   input.sources.push_back(errors->source);
   const auto rotation =
@@ -128,44 +123,40 @@ evemu::ObserveOptions observe_options(const EvemuInputArguments& arguments,
 
 Result<EvemuInput> from_files(const EvemuInputArguments& arguments) {
   auto config = load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   const auto hash = sha256_hex_of_file(arguments.machine);
-  if (!hash) return tl::make_unexpected(hash.error());
+  ABBE_TRY(hash);
   EvemuInput input;
   input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
 
   const auto* what = arguments.touches.empty() ? "errors" : "touches";
-  if (const auto valid = check_scales("identify evemu", what, *config, arguments.scales_corrected);
-      !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(check_scales("identify evemu", what, *config, arguments.scales_corrected));
   if (const auto& t = arguments.tip_offset_m) set_target(*config, *t);
   if (const auto given = require_target(config->machine); !given)
     return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
   const auto machine = evemu_machine(config->machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
 
   auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
   options.artefact_temperature = artefact_temperature(arguments, config->evemu);
   input.config = std::move(*config);
   const auto observe = arguments.touches.empty() ? observe_errors : observe_touches;
-  if (const auto observed = observe(arguments, *machine, options, input); !observed)
-    return tl::make_unexpected(observed.error());
+  ABBE_TRY(observe(arguments, *machine, options, input));
 
   return input;
 }
 
 Result<EvemuInput> from_recording(const EvemuInputArguments& arguments) {
   auto recording = open_recording(arguments.recording, arguments.machine);
-  if (!recording) return tl::make_unexpected(recording.error());
-  if (const auto given = require_target(recording->config.machine); !given)
-    return tl::make_unexpected(given.error());
+  ABBE_TRY(recording);
+  ABBE_TRY(require_target(recording->config.machine));
   const auto machine = evemu_machine(recording->config.machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
 
   ProgressBar bar;
   const auto run = last_complete_run<EvemuMethod>(*recording, recording->source.name,
                                                   "calibration with a ball array", bar);
-  if (!run) return tl::make_unexpected(run.error());
+  ABBE_TRY(run);
   auto options =
       observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size());
   options.artefact_temperature = run->artefact;
@@ -196,11 +187,9 @@ Result<EvemuInput> read_evemu_input(const EvemuInputArguments& arguments) {
 Result<void> read_rotation_reference(const EvemuInputArguments& arguments, EvemuInput& input) {
   if (arguments.reference.empty()) return {};
   const auto points = read_errors_csv(arguments.reference);
-  if (!points) return tl::make_unexpected(points.error());
-  if (auto inside = check_travel(arguments.reference, positions_of(points->errors), points->lines,
-                                 input.config.machine);
-      !inside)
-    return inside;
+  ABBE_TRY(points);
+  ABBE_TRY(check_travel(arguments.reference, positions_of(points->errors), points->lines,
+                        input.config.machine));
   input.sources.push_back(points->source);
   input.reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
   return {};

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 #include "output_files.hpp"
 
 namespace abbe::daemon {
@@ -20,10 +21,9 @@ Result<std::vector<ExportFile>> written_and_read(std::span<const ExportFile> fil
                                                  std::span<const PendingFile> pending) {
   std::vector<ExportFile> read;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    if (auto written = replace_file(pending[i].temporary, files[i].text); !written)
-      return tl::make_unexpected(written.error());
+    ABBE_TRY(replace_file(pending[i].temporary, files[i].text));
     auto text = read_regular_file(pending[i].temporary);
-    if (!text) return tl::make_unexpected(text.error());
+    ABBE_TRY(text);
     read.push_back({files[i].name, *std::move(text)});
   }
   return read;
@@ -44,10 +44,10 @@ Result<ExportProof> proven_and_renamed(std::span<const ExportFile> files,
                                        std::span<const PendingFile> pending,
                                        const ProofOfFiles& prove) {
   const auto read = written_and_read(files, pending);
-  if (!read) return tl::make_unexpected(read.error());
+  ABBE_TRY(read);
   auto proof = prove(*read);
   if (!proof) return proof;
-  if (auto renamed = rename_all(pending); !renamed) return tl::make_unexpected(renamed.error());
+  ABBE_TRY(rename_all(pending));
   return proof;
 }
 
@@ -78,8 +78,7 @@ Result<ExportProof> write_when_proven(std::span<const ExportFile> files,
   for (const auto& path : paths) {
     pending.push_back({path.string() + fmt::format(".{}.new", ::getpid()), path});
     if (!path.has_parent_path()) continue;
-    if (auto created = create_folder(path.parent_path(), NewFolder::OfTheCaller); !created)
-      return tl::make_unexpected(created.error());
+    ABBE_TRY(create_folder(path.parent_path(), NewFolder::OfTheCaller));
   }
 
   auto proof = proven_and_renamed(files, pending, prove);

@@ -9,6 +9,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "direction_option.hpp"
 #include "export_files.hpp"
@@ -49,8 +50,8 @@ Result<void> add_direction(ExportRequest& request, const ExportArguments& argume
                             "it can hold",
                             request.facts->name));
   const auto travel = parse_direction(arguments.direction);
-  if (!travel) return tl::make_unexpected(travel.error());
-  if (auto known = require_travel(request.document.model, arguments.model); !known) return known;
+  ABBE_TRY(travel);
+  ABBE_TRY(require_travel(request.document.model, arguments.model));
   request.travel = *travel;
   request.options.origin.direction = arguments.direction;
   return {};
@@ -58,7 +59,7 @@ Result<void> add_direction(ExportRequest& request, const ExportArguments& argume
 
 Result<void> add_nodes(ExportRequest& request, const ExportArguments& arguments) {
   const auto part = volume_of(arguments.volume);
-  if (!part) return tl::make_unexpected(part.error());
+  ABBE_TRY(part);
   const auto& model = request.document.model;
   const auto box = calib::export_box(model, *part);
   if (!box) return fail(ErrorCode::Usage, "--volume: " + box.error().text);
@@ -80,27 +81,26 @@ Result<void> add_nodes(ExportRequest& request, const ExportArguments& arguments)
 /// The options that need no model come first: a wrong one is reported at once.
 Result<ExportRequest> request_of(const ExportArguments& arguments) {
   const auto facts = format_of(arguments.to);
-  if (!facts) return tl::make_unexpected(facts.error());
+  ABBE_TRY(facts);
   const auto names = axis_names_of(arguments.axis_map, **facts);
-  if (!names) return tl::make_unexpected(names.error());
+  ABBE_TRY(names);
   const auto positive = positive_moves_of(arguments.positive, **facts);
-  if (!positive) return tl::make_unexpected(positive.error());
+  ABBE_TRY(positive);
 
   const auto forced = forced_by(arguments.force);
-  if (!forced) return tl::make_unexpected(forced.error());
+  ABBE_TRY(forced);
   auto named = found_model(arguments.model, arguments.store);
-  if (!named) return tl::make_unexpected(named.error());
+  ABBE_TRY(named);
   auto use = statements_of_use("export " + arguments.model,
                                obstacles_to_use(named->in_use(ModelPurpose::Control)), *forced);
-  if (!use) return tl::make_unexpected(use.error());
+  ABBE_TRY(use);
   print_cautions(arguments.model, *named);
   const auto tool_m = tool_of(arguments.tool, named->document.model);
-  if (!tool_m) return tl::make_unexpected(tool_m.error());
+  ABBE_TRY(tool_m);
   ExportRequest request{*facts, std::move(named->document), *tool_m, {}, {},
                         {},     {*names, *positive, {}}};
-  if (auto added = add_direction(request, arguments); !added)
-    return tl::make_unexpected(added.error());
-  if (auto added = add_nodes(request, arguments); !added) return tl::make_unexpected(added.error());
+  ABBE_TRY(add_direction(request, arguments));
+  ABBE_TRY(add_nodes(request, arguments));
 
   auto& origin = request.options.origin;
   origin.model_hash = model_hash(request.document);
@@ -177,8 +177,7 @@ Result<ExportReport> computed_report(const ExportRequest& request,
                                        correction_function(report.held));
   if (!loss) return tl::make_unexpected(error_of(loss.error()));
   report.loss = *loss;
-  if (auto useful = require_use(request, *loss); !useful)
-    return tl::make_unexpected(useful.error());
+  ABBE_TRY(require_use(request, *loss));
 
   const auto part = request.facts->holds;
   if (part == HeldPart::Positioning || part == HeldPart::Translations) {
@@ -198,17 +197,17 @@ fs::path report_path(const fs::path& folder) {
 Result<void> write_files(const ExportRequest& request, const ExportArguments& arguments,
                          ExportReport& report, std::span<const calib::ExportPlace> places) {
   const auto files = write_export(request.facts->format, report.held, request.options);
-  if (!files) return tl::make_unexpected(files.error());
+  ABBE_TRY(files);
   const auto paths = final_paths(*request.facts, arguments.out, *files);
   const std::array<fs::path, 1> model{file_of_model(arguments.model, arguments.store)};
   auto written = paths;
   if (request.facts->folder) written.push_back(report_path(arguments.out));
-  if (auto own = require_own_files(model, written); !own) return own;
+  ABBE_TRY(require_own_files(model, written));
   const auto proof = write_when_proven(*files, paths, [&](std::span<const ExportFile> read) {
     return prove_export(request.facts->format, read, settings_of(request), places,
                         correction_function(report.held));
   });
-  if (!proof) return tl::make_unexpected(proof.error());
+  ABBE_TRY(proof);
 
   report.proof = *proof;
   for (const auto& path : paths) report.files.push_back(path.string());
@@ -217,10 +216,9 @@ Result<void> write_files(const ExportRequest& request, const ExportArguments& ar
 
 Result<ExportReport> exported(const ExportArguments& arguments) {
   const auto request = request_of(arguments);
-  if (!request) return tl::make_unexpected(request.error());
+  ABBE_TRY(request);
   const fs::path out = arguments.out;
-  if (auto place = require_place(*request->facts, out); !place)
-    return tl::make_unexpected(place.error());
+  ABBE_TRY(require_place(*request->facts, out));
   constexpr std::uint32_t kSeed = 1;
   const auto places =
       calib::random_places(request->document.model, request->box, kExportPlaces, kSeed);
@@ -228,11 +226,9 @@ Result<ExportReport> exported(const ExportArguments& arguments) {
 
   auto report = computed_report(*request, *places);
   if (!report) return report;
-  if (auto written = write_files(*request, arguments, *report, *places); !written)
-    return tl::make_unexpected(written.error());
+  ABBE_TRY(write_files(*request, arguments, *report, *places));
   if (request->facts->folder) {
-    if (auto written = replace_file(report_path(out), report_text(*report)); !written)
-      return tl::make_unexpected(written.error());
+    ABBE_TRY(replace_file(report_path(out), report_text(*report)));
   }
   return report;
 }

@@ -17,6 +17,7 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/report/model_report.hpp"
+#include "abbe/result/try.hpp"
 #include "daemon_socket.hpp"
 #include "terminal.hpp"
 
@@ -34,12 +35,12 @@ void add_result_options(CLI::App& command, std::string& keep, bool& json, std::s
 Result<std::optional<ActiveDocument>> active_model(const std::string& store) {
   if (store.empty()) return std::nullopt;
   const auto opened = ModelStore::open(store);
-  if (!opened) return tl::make_unexpected(opened.error());
+  ABBE_TRY(opened);
   const auto activation = opened->activation();
-  if (!activation) return tl::make_unexpected(activation.error());
+  ABBE_TRY(activation);
   if (!*activation) return std::nullopt;
   auto document = opened->load((*activation)->id);
-  if (!document) return tl::make_unexpected(document.error());
+  ABBE_TRY(document);
   return ActiveDocument{*std::move(document), (*activation)->accepted_configuration};
 }
 
@@ -62,16 +63,16 @@ namespace {
 Result<ReportSubject> kept(const ResultPlace& place, const ModelDocument& document,
                            const calib::Verdict& verdict) {
   auto store = ModelStore::open(place.keep);
-  if (!store) return tl::make_unexpected(store.error());
+  ABBE_TRY(store);
   const auto id = store->add(document, verdict.accepted, verdict.reasons,
                              {user_name(), place.command, document.created});
-  if (!id) return tl::make_unexpected(id.error());
+  ABBE_TRY(id);
   return report_subject(*store, *id);
 }
 
 Result<void> write_report(const std::filesystem::path& folder, const ReportSubject& subject) {
   const auto page = model_report(subject);
-  if (!page) return tl::make_unexpected(page.error());
+  ABBE_TRY(page);
   return replace_file(folder / "report.html", *page);
 }
 
@@ -90,16 +91,15 @@ Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& ident
   ModelDocument document = identified;
   document.verdict = model_verdict(verdict);
   const std::filesystem::path folder = place.out;
-  if (auto made = create_folder(folder); !made) return made;
-  if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
-  for (const auto& [name, text] : more)
-    if (auto done = replace_file(folder / name, text); !done) return done;
+  ABBE_TRY(create_folder(folder));
+  ABBE_TRY(replace_file(folder / "model.json", to_json(document)));
+  for (const auto& [name, text] : more) ABBE_TRY(replace_file(folder / name, text));
 
   // Before the store: a model that cannot be reported is not kept, and the error says so.
-  if (auto done = write_report(folder, judged(document, verdict)); !done) return done;
+  ABBE_TRY(write_report(folder, judged(document, verdict)));
   if (place.keep.empty()) return {};
   const auto subject = kept(place, document, verdict);
-  if (!subject) return tl::make_unexpected(subject.error());
+  ABBE_TRY(subject);
   return write_report(folder, *subject);
 }
 

@@ -10,6 +10,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "commands.hpp"
 #include "terminal.hpp"
@@ -37,7 +38,7 @@ Result<Precalibrated> precalibrate(const IdentifyArtefactArguments& arguments) {
   if (!outward_1 || !outward_2)
     return tl::make_unexpected((outward_1 ? outward_2 : outward_1).error());
   const auto touches = read_touches_csv(arguments.touches);
-  if (!touches) return tl::make_unexpected(touches.error());
+  ABBE_TRY(touches);
   for (const auto& touch : touches->touches)
     if (touch.position != touches->touches.front().position)
       return fail(

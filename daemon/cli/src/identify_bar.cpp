@@ -13,6 +13,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/gauge_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
@@ -31,14 +32,14 @@ struct BarOnMachine {
 
 Result<BarOnMachine> calibrated_bar(const IdentifyBarArguments& arguments) {
   const auto bar = read_bar_toml(arguments.bar);
-  if (!bar) return tl::make_unexpected(bar.error());
+  ABBE_TRY(bar);
   const auto plan = read_bar_plan_toml(arguments.plan, bar->bar);
-  if (!plan) return tl::make_unexpected(plan.error());
+  ABBE_TRY(plan);
   const auto points =
       read_bar_points_csv(arguments.points, bar->bar, *plan, nodes_of_measuring_machine());
-  if (!points) return tl::make_unexpected(points.error());
+  ABBE_TRY(points);
   const auto gauge = read_gauge_toml(arguments.gauge);
-  if (!gauge) return tl::make_unexpected(gauge.error());
+  ABBE_TRY(gauge);
 
   auto found = calib::mfb::calibrate_bar(bar->bar, plan->plan, points->passes, gauge->gauge);
   if (!found) return tl::make_unexpected(error_of(found.error()));

@@ -28,6 +28,7 @@
 #include "abbe/methods/evemu/document.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "evemu_input.hpp"
 #include "identified_model.hpp"
@@ -69,7 +70,7 @@ Result<evemu::SparseOptions> sparse_options(const std::string& given,
     return options;
   }
   const auto text = read_text(given);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   auto folds = calib::sparse::parse_folds(*text);
   if (!folds) return fail(ErrorCode::BadInput, fmt::format("{}: {}", given, folds.error().text));
   sources.push_back({std::filesystem::path(given).filename().string(), sha256_hex(*text)});
@@ -85,20 +86,19 @@ Result<evemu::JudgeOptions> judge_options(const IdentifyEvemuArguments& argument
   options.limits = gate_limits(config.gate);
   options.accept_shape_only = arguments.accept_shape_only || config.gate.accepts(evemu::kShapeOnly);
   auto sparse = sparse_options(arguments.folds.value_or(config.evemu.folds), input.sources);
-  if (!sparse) return tl::make_unexpected(sparse.error());
+  ABBE_TRY(sparse);
   options.solve.sparse = std::move(*sparse);
   return options;
 }
 
 Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   const auto active = active_model(arguments.keep);
-  if (!active) return tl::make_unexpected(active.error());
+  ABBE_TRY(active);
   auto input = read_evemu_input(arguments.input);
-  if (!input) return tl::make_unexpected(input.error());
+  ABBE_TRY(input);
   const auto judging = judge_options(arguments, *input);
-  if (!judging) return tl::make_unexpected(judging.error());
-  if (const auto read = read_rotation_reference(arguments.input, *input); !read)
-    return tl::make_unexpected(read.error());
+  ABBE_TRY(judging);
+  ABBE_TRY(read_rotation_reference(arguments.input, *input));
 
   auto solution = evemu::solve(input->observations, judging->solve);
   if (solution && input->reference)

@@ -15,6 +15,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/run_figures.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
@@ -67,7 +68,7 @@ Error contradiction_of(std::vector<std::string> contradictions) {
 Result<JointOutcome> judged(const IdentifyJointArguments& arguments, const JointInput& input,
                             joint::JointIdentification identified, ProgressBar& bar) {
   const auto active = active_model(arguments.keep);
-  if (!active) return tl::make_unexpected(active.error());
+  ABBE_TRY(active);
   const auto other = comparison_model(*active, input.config);
   calib::otf::Options options = otf_options({}, input.config);
   if (arguments.estimator)

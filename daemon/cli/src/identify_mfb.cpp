@@ -24,6 +24,7 @@
 #include "abbe/methods/mfb/method.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/recording/recorded_clock.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
@@ -60,12 +61,8 @@ struct MfbInput {
 Result<Config> read_config(const IdentifyMfbArguments& arguments) {
   auto config = load_config(arguments.machine);
   if (!config) return config;
-  if (const auto valid =
-          check_scales("identify mfb", "points", *config, arguments.scales_corrected);
-      !valid)
-    return tl::make_unexpected(valid.error());
-  if (const auto valid = check_bar_machine(arguments.machine, config->machine); !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(check_scales("identify mfb", "points", *config, arguments.scales_corrected));
+  ABBE_TRY(check_bar_machine(arguments.machine, config->machine));
   return config;
 }
 
@@ -80,11 +77,11 @@ mfb::Options options_of(const IdentifyMfbArguments& arguments) {
 /// session takes no such touch.
 Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
   auto recording = open_recording(arguments.recording, arguments.machine);
-  if (!recording) return tl::make_unexpected(recording.error());
+  ABBE_TRY(recording);
   ProgressBar bar;
   auto run =
       last_complete_run<MfbMethod>(*recording, arguments.recording, "calibration with a bar", bar);
-  if (!run) return tl::make_unexpected(run.error());
+  ABBE_TRY(run);
 
   MfbInput input{std::move(recording->config),
                  {.bar = {}, .plan = {}, .passes = {}, .options = options_of(arguments)},
@@ -101,17 +98,17 @@ Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
 
 Result<MfbInput> input_of_files(const IdentifyMfbArguments& arguments) {
   auto config = read_config(arguments);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   const auto hash = sha256_hex_of_file(arguments.machine);
-  if (!hash) return tl::make_unexpected(hash.error());
+  ABBE_TRY(hash);
   const auto machine = mfb_machine(config->machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
   auto bar = read_bar_toml(arguments.bar);
-  if (!bar) return tl::make_unexpected(bar.error());
+  ABBE_TRY(bar);
   auto plan = read_bar_plan_toml(arguments.plan, bar->bar);
-  if (!plan) return tl::make_unexpected(plan.error());
+  ABBE_TRY(plan);
   auto points = read_bar_points_csv(arguments.points, bar->bar, *plan, machine->nodes);
-  if (!points) return tl::make_unexpected(points.error());
+  ABBE_TRY(points);
 
   MfbInput input{std::move(*config),
                  {.bar = std::move(bar->bar),
@@ -165,7 +162,7 @@ Error in_points(const IdentifyMfbArguments& arguments, const MfbInput& input, Er
 
 Result<MfbCandidate> identified(const IdentifyMfbArguments& arguments, const MfbInput& input) {
   const auto active = active_model(arguments.keep);
-  if (!active) return tl::make_unexpected(active.error());
+  ABBE_TRY(active);
   const auto other = comparison_model(*active, input.config);
   ProgressBar bar;
   auto candidate =

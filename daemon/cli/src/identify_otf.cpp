@@ -24,6 +24,7 @@
 #include "abbe/methods/otf/path_readings.hpp"
 #include "abbe/methods/otf/time_unit.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "backlash_lines.hpp"
 #include "commands.hpp"
@@ -123,20 +124,17 @@ struct Files {
 
 Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
   auto config = load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   const auto hash = sha256_hex_of_file(arguments.machine);
-  if (!hash) return tl::make_unexpected(hash.error());
+  ABBE_TRY(hash);
   auto path = read_path_csv(arguments.path);
-  if (!path) return tl::make_unexpected(path.error());
+  ABBE_TRY(path);
   auto tracker = read_tracker_csv(
       arguments.tracker, [&](double fraction) { bar.show("reading the tracker", fraction); });
-  if (!tracker) return tl::make_unexpected(tracker.error());
-  if (const auto placed = place_tracker(*tracker, arguments.tracker_centre_m(0), arguments.tracker,
-                                        arguments.centre_option);
-      !placed)
-    return tl::make_unexpected(placed.error());
-  if (const auto valid = check_time_unit(arguments.tracker, *tracker, *path); !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(tracker);
+  ABBE_TRY(place_tracker(*tracker, arguments.tracker_centre_m(0), arguments.tracker,
+                         arguments.centre_option));
+  ABBE_TRY(check_time_unit(arguments.tracker, *tracker, *path));
   std::vector<InputFile> sources{
       {std::filesystem::path(arguments.machine).filename().string(), *hash},
       path->source,
@@ -146,9 +144,8 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar
   if (!arguments.encoder.empty()) {
     auto read = read_encoder_csv(
         arguments.encoder, [&](double fraction) { bar.show("reading the scales", fraction); });
-    if (!read) return tl::make_unexpected(read.error());
-    if (const auto valid = check_time_unit(arguments.encoder, *read, *path); !valid)
-      return tl::make_unexpected(valid.error());
+    ABBE_TRY(read);
+    ABBE_TRY(check_time_unit(arguments.encoder, *read, *path));
     sources.push_back(read->source);
     encoder = std::move(*read);
   }
@@ -171,26 +168,20 @@ Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, con
 Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
                                     const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
-  if (!files) return tl::make_unexpected(files.error());
+  ABBE_TRY(files);
   apply(arguments, files->config);
-  if (const auto valid = apply_smoothness(arguments.smoothness, files->config); !valid)
-    return tl::make_unexpected(valid.error());
-  if (const auto valid =
-          check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
-      !valid)
-    return tl::make_unexpected(valid.error());
-  if (const auto valid = check_path(arguments.path, files->path, files->config); !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(apply_smoothness(arguments.smoothness, files->config));
+  ABBE_TRY(check_scales("identify otf", "a path", files->config, arguments.scales_corrected));
+  ABBE_TRY(check_path(arguments.path, files->path, files->config));
   const auto compared = vertices_compared(arguments, *files);
-  if (!compared) return tl::make_unexpected(compared.error());
+  ABBE_TRY(compared);
   const auto machine = otf_machine(files->config.machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
 
   otf::Options options = otf_options(files->tracker.points, files->config);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (files->encoder) options.orientation.scales_agree = true;
-  if (const auto valid = apply_frame(files->tracker, arguments.tracker, options); !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(apply_frame(files->tracker, arguments.tracker, options));
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
 
@@ -233,7 +224,7 @@ namespace {
 Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto run = identify_files(arguments, active, bar);
-  if (!run) return tl::make_unexpected(run.error());
+  ABBE_TRY(run);
   return outcome_of({std::move(run->found.solution), std::move(run->verdict), run->mode,
                      std::move(run->residuals)},
                     run->config, std::move(run->sources));
@@ -328,7 +319,7 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& argume
 
 Result<OtfOutcome> identify(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
   const auto active = active_model(arguments.keep);
-  if (!active) return tl::make_unexpected(active.error());
+  ABBE_TRY(active);
   if (!arguments.targets.empty()) return from_targets(arguments, *active, bar);
   return arguments.recording.empty() ? from_files(arguments, *active, bar)
                                      : from_recording(arguments, *active, bar);
@@ -338,7 +329,7 @@ Result<OtfOutcome> identify(const IdentifyOtfArguments& arguments, ProgressBar& 
 Result<void> read_tracker_centres(IdentifyOtfArguments& arguments) {
   for (const auto& text : arguments.tracker_centres) {
     const auto centre_m = parse_mm("--tracker-centre-mm", text);
-    if (!centre_m) return tl::make_unexpected(centre_m.error());
+    ABBE_TRY(centre_m);
     arguments.tracker_centres_m.push_back(*centre_m);
   }
   const std::size_t files = std::max<std::size_t>(1, arguments.targets.size());

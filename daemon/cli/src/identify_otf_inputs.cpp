@@ -5,6 +5,7 @@
 #include "abbe/calib/model/backlash.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/travel_faults.hpp"
 #include "identify_otf.hpp"
 #include "target_offset.hpp"
@@ -64,10 +65,7 @@ Result<void> apply_smoothness(const std::string& text, Config& config) {
 }
 
 Result<void> check_path(const std::string& file, const PathFile& path, const Config& config) {
-  if (auto inside =
-          check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine);
-      !inside)
-    return inside;
+  ABBE_TRY(check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine));
   auto valid = check_otf_path(path.vertices_m, config.machine, calib_of(config.otf.mode),
                               calib_of(config.otf.backlash));
   if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);

@@ -8,6 +8,7 @@
 #include "abbe/methods/otf/method.hpp"
 #include "abbe/recording/recorded_clock.hpp"
 #include "abbe/replay/replay.hpp"
+#include "abbe/result/try.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
 #include "last_complete_run.hpp"
@@ -50,8 +51,7 @@ Result<Config> config_for(const IdentifyOtfArguments& arguments, const Config& r
   if (recorded.machine.tracker_position_m)
     config->machine.tracker_position_m = recorded.machine.tracker_position_m;
   apply(arguments, *config);
-  if (const auto given = require_target(config->machine); !given)
-    return tl::make_unexpected(given.error());
+  ABBE_TRY(require_target(config->machine));
   return config;
 }
 
@@ -59,17 +59,17 @@ Result<Config> config_for(const IdentifyOtfArguments& arguments, const Config& r
 
 Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
   const auto recording = open_recording(arguments.recording);
-  if (!recording) return tl::make_unexpected(recording.error());
+  ABBE_TRY(recording);
   auto config = config_for(arguments, recording->config);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   auto run = last_complete_run<OtfMethod>(*recording, arguments.recording, "run along a path", bar);
-  if (!run) return tl::make_unexpected(run.error());
+  ABBE_TRY(run);
   if (arguments.u_scale_ppm) run->u_scale = u_scale_of(arguments, *config);
 
   const IdentificationWatch watch{
       .progress = [&bar](double share) { bar.show("identifying", share); }};
   auto identified = identify_observations(*run, *config, nullptr, watch);
-  if (!identified) return tl::make_unexpected(identified.error());
+  ABBE_TRY(identified);
   judge_recording(recording->reader, identified->verdict);
   return OtfFromFiles{*std::move(config),
                       {recording->source},
@@ -83,19 +83,17 @@ Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments, Pr
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
                                   const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto recording = open_recording(arguments.recording, arguments.machine);
-  if (!recording) return tl::make_unexpected(recording.error());
+  ABBE_TRY(recording);
   apply(arguments, recording->config);
-  if (const auto valid = apply_smoothness(arguments.smoothness, recording->config); !valid)
-    return tl::make_unexpected(valid.error());
-  if (const auto given = require_target(recording->config.machine); !given)
-    return tl::make_unexpected(given.error());
+  ABBE_TRY(apply_smoothness(arguments.smoothness, recording->config));
+  ABBE_TRY(require_target(recording->config.machine));
   const auto other = comparison_model(active, recording->config);
   auto replayed = replay(
       recording->reader, recording->config,
       {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
+  ABBE_TRY(replayed);
   auto recorded = last_complete_run(std::move(*replayed), arguments.recording);
-  if (!recorded) return tl::make_unexpected(recorded.error());
+  ABBE_TRY(recorded);
   other.add_note(recorded->candidate.verdict);
   auto outcome = outcome_of(std::move(recorded->candidate), recording->config, {recording->source});
   add_measured(outcome.document, recorded->observed, recorded_clock(recording->reader).dates);

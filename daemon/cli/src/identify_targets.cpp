@@ -13,6 +13,7 @@
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/time_unit.hpp"
+#include "abbe/result/try.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
 #include "scales_corrected.hpp"
@@ -60,28 +61,25 @@ Result<std::pair<calib::Vector3, std::string>> parse_target(const std::string& t
 
 Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
   auto config = load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   const auto hash = sha256_hex_of_file(arguments.machine);
-  if (!hash) return tl::make_unexpected(hash.error());
+  ABBE_TRY(hash);
   auto path = read_path_csv(arguments.path);
-  if (!path) return tl::make_unexpected(path.error());
+  ABBE_TRY(path);
 
   TargetRuns all{std::move(*config), std::move(*path), {}, {}};
   all.sources = {{std::filesystem::path(arguments.machine).filename().string(), *hash},
                  all.path.source};
   for (const auto& text : arguments.targets) {
     const auto target = parse_target(text);
-    if (!target) return tl::make_unexpected(target.error());
+    ABBE_TRY(target);
     auto tracker = read_tracker_csv(target->second, [&](double fraction) {
       bar.show(fmt::format("reading {}", target->second), fraction);
     });
-    if (!tracker) return tl::make_unexpected(tracker.error());
-    if (const auto valid = check_time_unit(target->second, *tracker, all.path); !valid)
-      return tl::make_unexpected(valid.error());
-    if (const auto placed = place_tracker(*tracker, arguments.tracker_centre_m(all.runs.size()),
-                                          target->second, arguments.centre_option);
-        !placed)
-      return tl::make_unexpected(placed.error());
+    ABBE_TRY(tracker);
+    ABBE_TRY(check_time_unit(target->second, *tracker, all.path));
+    ABBE_TRY(place_tracker(*tracker, arguments.tracker_centre_m(all.runs.size()), target->second,
+                           arguments.centre_option));
     all.sources.push_back(tracker->source);
     all.runs.push_back({target->first, std::move(*tracker), target->second});
   }
@@ -89,10 +87,7 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, ProgressBar&
 }
 
 Result<void> check_runs(const IdentifyOtfArguments& arguments, TargetRuns& all) {
-  if (const auto valid =
-          check_scales("identify otf", "a path", all.config, arguments.scales_corrected);
-      !valid)
-    return valid;
+  ABBE_TRY(check_scales("identify otf", "a path", all.config, arguments.scales_corrected));
   all.config.machine.target_given = true;  // by --target
   return check_path(arguments.path, all.path, all.config);
 }
@@ -118,14 +113,12 @@ calib::otf::Solution of_all_runs(calib::otf::TargetsIdentification found) {
 Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
                                 const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto all = read_runs(arguments, bar);
-  if (!all) return tl::make_unexpected(all.error());
+  ABBE_TRY(all);
   apply(arguments, all->config);
-  if (const auto valid = apply_smoothness(arguments.smoothness, all->config); !valid)
-    return tl::make_unexpected(valid.error());
-  if (const auto valid = check_runs(arguments, *all); !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(apply_smoothness(arguments.smoothness, all->config));
+  ABBE_TRY(check_runs(arguments, *all));
   const auto machine = otf_machine(all->config.machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
 
   calib::otf::Options options = otf_options(all->runs.front().tracker.points, all->config);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
@@ -133,9 +126,7 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
   options.progress = [&](calib::otf::Stage stage, double fraction) {
     bar.show(words(stage), fraction);
   };
-  for (const TargetPoints& run : all->runs)
-    if (const auto valid = apply_frame(run.tracker, run.file, options); !valid)
-      return tl::make_unexpected(valid.error());
+  for (const TargetPoints& run : all->runs) ABBE_TRY(apply_frame(run.tracker, run.file, options));
   calib::otf::Noise noise = otf_noise(all->config.machine);
   noise.u_scale = u_scale_of(arguments, all->config);
 

@@ -10,6 +10,7 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/mfb/identification.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "scales_corrected.hpp"
 
@@ -29,18 +30,15 @@ struct TouchedBar {
 
 Result<TouchedBar> read_touched_bar(const IdentifyJointArguments& arguments, const BarFiles& files,
                                     const Config& config) {
-  if (const auto valid =
-          check_scales("identify joint", "points", config, arguments.scales_corrected);
-      !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(check_scales("identify joint", "points", config, arguments.scales_corrected));
   const auto machine = mfb_machine(config.machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
   auto bar = read_bar_toml(files.bar);
-  if (!bar) return tl::make_unexpected(bar.error());
+  ABBE_TRY(bar);
   auto plan = read_bar_plan_toml(files.plan, bar->bar);
-  if (!plan) return tl::make_unexpected(plan.error());
+  ABBE_TRY(plan);
   auto points = read_bar_points_csv(files.points, bar->bar, *plan, machine->nodes);
-  if (!points) return tl::make_unexpected(points.error());
+  ABBE_TRY(points);
   if (!points->against_pass.empty())
     return tl::make_unexpected(Error{
         ErrorCode::BadInput,
@@ -76,7 +74,7 @@ calib::Verdict verdict_of_bar(MfbTask& task, const Config& config) {
 Result<void> add_bar(const IdentifyJointArguments& arguments, const BarFiles& files,
                      JointInput& input) {
   auto touched = read_touched_bar(arguments, files, input.config);
-  if (!touched) return tl::make_unexpected(touched.error());
+  ABBE_TRY(touched);
   MfbTask& task = touched->task;
   auto verdict = verdict_of_bar(task, input.config);
 

@@ -11,6 +11,7 @@
 #include "abbe/calib/evemu/judge/judge.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/parts_file.hpp"
 #include "evemu_input.hpp"
 #include "identify_otf.hpp"
@@ -125,7 +126,7 @@ Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& fi
                                      : identify_recorded(of_run, bar);
   if (!run) return tl::make_unexpected(in_part(files.name, run.error()));
   if (!files.recording.empty()) {
-    if (auto same = require_same_readings(files.name, run->config, input); !same) return same;
+    ABBE_TRY(require_same_readings(files.name, run->config, input));
     take_readings_of(run->config, input.config);
   }
   const auto& solution = run->found.solution;
@@ -136,7 +137,7 @@ Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& fi
   }
 
   const auto offset = shared_offset(files, solution);
-  if (!offset) return tl::make_unexpected(offset.error());
+  ABBE_TRY(offset);
   const calib::joint::CommonEffects effects{.u_ranges = run->noise.u_scale,
                                             .ranges_of = files.instrument,
                                             .u_axis_scale = run->noise.u_axis_scale,
@@ -216,7 +217,7 @@ Result<void> add_array(const IdentifyJointArguments& arguments, const ArrayFiles
 
 Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, ProgressBar& bar) {
   auto config = load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   if (config->otf.backlash != OtfBacklash::None)
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: otf.backlash: must be \"none\" for identify joint: half the "
@@ -229,20 +230,16 @@ Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, Pro
                             "for each of them",
                             arguments.machine));
   const auto hash = sha256_hex_of_file(arguments.machine);
-  if (!hash) return tl::make_unexpected(hash.error());
+  ABBE_TRY(hash);
   const auto files = read_parts_toml(arguments.parts);
-  if (!files) return tl::make_unexpected(files.error());
+  ABBE_TRY(files);
 
   JointInput input{
       std::move(*config),
       {{std::filesystem::path(arguments.machine).filename().string(), *hash}, files->source}};
-  for (const RunFiles& run : files->runs)
-    if (const auto added = add_run(arguments, run, input, bar); !added)
-      return tl::make_unexpected(added.error());
+  for (const RunFiles& run : files->runs) ABBE_TRY(add_run(arguments, run, input, bar));
   note_unshared_offsets(files->runs, input.facts);
-  for (const ArrayFiles& array : files->arrays)
-    if (const auto added = add_array(arguments, array, input, bar); !added)
-      return tl::make_unexpected(added.error());
+  for (const ArrayFiles& array : files->arrays) ABBE_TRY(add_array(arguments, array, input, bar));
   for (const BarFiles& files_of_bar : files->bars) {
     bar.show(fmt::format("evaluating {}", files_of_bar.name), 0.0);
     if (const auto added = add_bar(arguments, files_of_bar, input); !added)

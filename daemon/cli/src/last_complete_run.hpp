@@ -11,6 +11,7 @@
 
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/replay/replay.hpp"
+#include "abbe/result/try.hpp"
 #include "opened_recording.hpp"
 #include "terminal.hpp"
 
@@ -32,7 +33,7 @@ template <class Method>
                                       if (auto* of_method = std::get_if<Run>(&run))
                                         last = std::move(*of_method);
                                     }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
+  ABBE_TRY(replayed);
   if (last) return *std::move(last);
 
   std::string why = replayed->calibrations.empty() ? "no calibration was requested"

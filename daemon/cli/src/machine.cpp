@@ -11,6 +11,7 @@
 
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/config/capabilities.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "machine_stop.hpp"
@@ -23,7 +24,7 @@ using nlohmann::json;
 
 Result<json> ask_machine(const DaemonSocket& where, json request) {
   const auto socket = socket_path(where);
-  if (!socket) return tl::unexpected(socket.error());
+  ABBE_TRY(socket);
   request["do"] = "machine";
   return ask_daemon(*socket, request);
 }

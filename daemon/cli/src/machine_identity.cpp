@@ -19,6 +19,7 @@
 #include "abbe/base/printable.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "terminal.hpp"
@@ -34,7 +35,7 @@ struct IdentityArguments {
 Result<std::filesystem::path> data_dir_of(const IdentityArguments& arguments) {
   if (arguments.config.empty()) return arguments.data_dir;
   const auto config = load_config(arguments.config);
-  if (!config) return tl::unexpected(config.error());
+  ABBE_TRY(config);
   return config->daemon.data_dir;
 }
 

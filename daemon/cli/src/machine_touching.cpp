@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/result/try.hpp"
 #include "daemon_socket.hpp"
 #include "interruption.hpp"
 #include "machine_stop.hpp"
@@ -99,7 +100,7 @@ TouchesMade follow_touches(const std::filesystem::path& socket, std::size_t aske
 
 Result<calib::Vector3> machine_position(const std::filesystem::path& socket) {
   const auto answer = ask_daemon(socket, {{"do", "touch"}, {"where", true}});
-  if (!answer) return tl::unexpected(answer.error());
+  ABBE_TRY(answer);
   const auto p = (*answer)["at_m"].get<std::array<double, 3>>();
   return calib::Vector3{p[0], p[1], p[2]};
 }

@@ -15,6 +15,7 @@
 #include "abbe/calib/direct/readings_off.hpp"
 #include "abbe/calib/direct/volume.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/measured_file.hpp"
 #include "figures.hpp"
 #include "terminal.hpp"
@@ -60,7 +61,7 @@ std::vector<std::string> lines_of_rows_off(const std::string& name, const Measur
 Result<MeasuredComparison> compared(const calib::VolumetricModel& model,
                                     const MeasuredOptions& options) {
   auto file = read_measured_csv(options.file);
-  if (!file) return tl::make_unexpected(file.error());
+  ABBE_TRY(file);
   const auto wanted = compare_options(options);
   auto tables = direct::compare(file->errors, model, wanted);
   if (!tables) {
@@ -303,7 +304,7 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
 Result<int> compare_with_measured(const calib::VolumetricModel& model,
                                   const MeasuredOptions& options, bool json) {
   const auto found = compared(model, options);
-  if (!found) return tl::make_unexpected(found.error());
+  ABBE_TRY(found);
   json ? print_measured_json(*found, options) : print_measured_text(*found);
 
   if (any_with(*found, direct::Finding::Contradicts)) return exit_code(ErrorCode::Refused);

@@ -13,6 +13,7 @@
 #include "abbe/methods/mfb/method.hpp"
 #include "abbe/pipeline/session_status.hpp"
 #include "abbe/replay/replay.hpp"
+#include "abbe/result/try.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -57,7 +58,7 @@ Result<RecordedTouches> touches_after(protocol::HostTime from, const OpenedRecor
                                     },
                                 .events = take_event,
                                 .runs = [](const CalibrationRun&) {}});
-  if (!replayed) return tl::make_unexpected(replayed.error());
+  ABBE_TRY(replayed);
   return found;
 }
 
@@ -65,12 +66,12 @@ Result<RecordedTouches> touches_after(protocol::HostTime from, const OpenedRecor
 
 Result<MfbRequest> bar_request_to_continue(const OpenedRecording& recording) {
   auto request = last_bar_request(recording);
-  if (!request) return tl::make_unexpected(request.error());
+  ABBE_TRY(request);
   auto& asked = std::get<MfbRequest>(request->task);
   auto acquisition = MfbAcquisition::create(asked, MfbMethod::options(recording.config));
-  if (!acquisition) return tl::make_unexpected(acquisition.error());
+  ABBE_TRY(acquisition);
   const auto recorded = touches_after(request->from, recording);
-  if (!recorded) return tl::make_unexpected(recorded.error());
+  ABBE_TRY(recorded);
 
   acquisition->begin(request->from);
   for (const protocol::Snapshot& touch : recorded->touches)

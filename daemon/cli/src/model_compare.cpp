@@ -11,6 +11,7 @@
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "direction_option.hpp"
 #include "figures.hpp"
@@ -51,19 +52,18 @@ std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
 
 Result<Comparison> compare(const ModelCompareArguments& arguments) {
   const auto found_a = found_model(arguments.a, arguments.store);
-  if (!found_a) return tl::make_unexpected(found_a.error());
+  ABBE_TRY(found_a);
   const auto found_b = found_model(arguments.b, arguments.store);
-  if (!found_b) return tl::make_unexpected(found_b.error());
+  ABBE_TRY(found_b);
   const std::array machines{of_machine(arguments.a, *found_a), of_machine(arguments.b, *found_b)};
   auto different = require_same_machine("model compare", machines, arguments.other_machine);
-  if (!different) return tl::make_unexpected(different.error());
+  ABBE_TRY(different);
   const ModelDocument *const a = &found_a->document, *const b = &found_b->document;
 
   const auto travel = parse_direction(arguments.direction);
-  if (!travel) return tl::make_unexpected(travel.error());
+  ABBE_TRY(travel);
   if (!arguments.direction.empty() && b->model.travel() == nullptr) {
-    if (auto known = require_travel(a->model, arguments.a); !known)
-      return tl::make_unexpected(known.error());
+    ABBE_TRY(require_travel(a->model, arguments.a));
   }
 
   const auto points = common_points(a->model, b->model);

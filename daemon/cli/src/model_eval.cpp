@@ -7,6 +7,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "commands.hpp"
 #include "direction_option.hpp"
@@ -55,30 +56,29 @@ Result<std::vector<calib::AxisTravel>> travel_of(const ModelEvalArguments& argum
                                                  const PointsFile& points,
                                                  const calib::VolumetricModel& model) {
   const auto given = parse_direction(arguments.direction);
-  if (!given) return tl::make_unexpected(given.error());
+  ABBE_TRY(given);
   const bool of_points = !points.travel.empty();
   if (of_points && !arguments.direction.empty())
     return fail(ErrorCode::Usage,
                 fmt::format("--direction: {} has the columns dx, dy, dz; give one of the two",
                             arguments.points));
   if (of_points || !arguments.direction.empty()) {
-    if (auto known = require_travel(model, arguments.model); !known)
-      return tl::make_unexpected(known.error());
+    ABBE_TRY(require_travel(model, arguments.model));
   }
   return of_points ? points.travel : std::vector(points.points_m.size(), *given);
 }
 
 Result<std::string> evaluate(const ModelEvalArguments& arguments) {
   const auto found = found_model(arguments.model, arguments.store);
-  if (!found) return tl::make_unexpected(found.error());
+  ABBE_TRY(found);
   const ModelDocument* const document = &found->document;
   const auto points = read_points_csv(arguments.points);
-  if (!points) return tl::make_unexpected(points.error());
+  ABBE_TRY(points);
   const auto tool_m = tool_of(arguments.tool, document->model);
-  if (!tool_m) return tl::make_unexpected(tool_m.error());
+  ABBE_TRY(tool_m);
 
   const auto travel = travel_of(arguments, *points, document->model);
-  if (!travel) return tl::make_unexpected(travel.error());
+  ABBE_TRY(travel);
 
   std::string text;
   print_cautions(arguments.model, *found);
@@ -90,7 +90,7 @@ Result<std::string> evaluate(const ModelEvalArguments& arguments) {
   for (std::size_t i = 0; i < points->points_m.size(); ++i) {
     const auto line =
         row(document->model, points->points_m[i], *tool_m, (*travel)[i], arguments.correction);
-    if (!line) return tl::make_unexpected(line.error());
+    ABBE_TRY(line);
     text += *line;
   }
 

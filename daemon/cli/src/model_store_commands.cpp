@@ -13,6 +13,7 @@
 #include "abbe/calib/model/backlash.hpp"
 #include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/stored_model.hpp"
+#include "abbe/result/try.hpp"
 #include "commands.hpp"
 #include "force_option.hpp"
 #include "store_option.hpp"
@@ -159,9 +160,9 @@ int show(const ModelStoreArguments& arguments) {
 Result<std::string> accepted_configuration(const ModelStoreArguments& arguments,
                                            const ModelStore& store, const std::string& id) {
   const auto config = load_config(arguments.store.config);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   const auto document = store.load(id);
-  if (!document) return tl::make_unexpected(document.error());
+  ABBE_TRY(document);
   const auto present = present_configuration(*config);
   const auto fit = fit_of(*document, present);
   if (fit.kind == ConfigurationFit::Kind::OlderHash) return present.hash;
@@ -174,8 +175,7 @@ Result<std::string> accepted_configuration(const ModelStoreArguments& arguments,
 }
 
 Result<void> check_activation(const ModelStoreArguments& arguments) {
-  if (const auto forced = forced_by(arguments.force); !forced)
-    return tl::make_unexpected(forced.error());
+  ABBE_TRY(forced_by(arguments.force));
   if (arguments.accept_older_hash && arguments.force.why.empty())
     return fail(ErrorCode::Usage,
                 "--accept-older-hash needs --why: the store keeps who accepted the model and why");

@@ -7,18 +7,19 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/replay/replay.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
 Result<OpenedRecording> open_recording(const std::string& file, const std::string& config) {
   auto reader = RecordingReader::open(file);
-  if (!reader) return tl::make_unexpected(reader.error());
+  ABBE_TRY(reader);
   const auto recorded = recorded_config(*reader, file);
   auto read = config.empty() ? recorded : load_config(config);
-  if (!read) return tl::make_unexpected(read.error());
+  ABBE_TRY(read);
   if (!config.empty()) take_recorded_readings(*read, recorded ? &*recorded : nullptr);
   const auto hash = sha256_hex_of_file(file);
-  if (!hash) return tl::make_unexpected(hash.error());
+  ABBE_TRY(hash);
   return OpenedRecording{std::move(*reader),
                          std::move(*read),
                          {std::filesystem::path(file).filename().string(), *hash}};

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -133,7 +134,7 @@ Result<void> write_pdf(const std::string& html, const fs::path& pdf) {
     return fail(ErrorCode::Io,
                 "--pdf: no converter is installed; install weasyprint or chromium, or print the "
                 "HTML report from a browser");
-  if (auto done = replace_file(page, html); !done) return done;
+  ABBE_TRY(replace_file(page, html));
 
   const auto child = start_converter(words);
   const bool done = child && succeeds(*child);

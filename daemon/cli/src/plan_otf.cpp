@@ -26,6 +26,7 @@
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/path_plan.hpp"
 #include "abbe/methods/otf/path_program.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "commands.hpp"
 #include "terminal.hpp"
@@ -64,7 +65,7 @@ struct PathPlan {
 /// The configuration file that the options stand for, without tracker and devices.
 Result<Config> machine_of_options(const PlanOtfArguments& arguments) {
   const auto tool_m = parse_mm("--tool", arguments.tool);
-  if (!tool_m) return tl::make_unexpected(tool_m.error());
+  ABBE_TRY(tool_m);
   std::string text =
       fmt::format("[machine]\nname = \"command line\"\nchain = \"{}\"\n", arguments.chain);
   for (std::size_t k = 0; k < 3; ++k) {
@@ -82,7 +83,7 @@ Result<std::vector<calib::Vector3>> trackers_of(const PlanOtfArguments& argument
   std::vector<calib::Vector3> trackers;
   for (const auto& text : arguments.trackers) {
     const auto at = parse_mm("--tracker-at", text);
-    if (!at) return tl::make_unexpected(at.error());
+    ABBE_TRY(at);
     trackers.push_back(*at);
   }
   if (trackers.empty() && machine.tracker_position_m)
@@ -95,10 +96,9 @@ Result<std::vector<calib::Vector3>> trackers_of(const PlanOtfArguments& argument
 }
 
 Result<otf::PlannedRun> run_of(const PlanOtfArguments& arguments, const Config& config) {
-  if (auto given = require_target(config.machine); !given)
-    return tl::make_unexpected(given.error());
+  ABBE_TRY(require_target(config.machine));
   const auto machine = otf_machine(config.machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
   otf::PlannedRun run{.machine = *machine, .noise = otf_noise(config.machine)};
   run.backlash = calib_of(config.otf.backlash);
   run.drive = arguments.drive;
@@ -137,30 +137,30 @@ Result<std::vector<std::pair<calib::Vector3, double>>> compare_trackers(
 
 Result<otf::Path> path_of_file(const std::string& file) {
   const auto path = read_path_csv(file);
-  if (!path) return tl::make_unexpected(path.error());
+  ABBE_TRY(path);
   return otf_path(path->vertices_m);
 }
 
 Result<PathPlan> planned(const PlanOtfArguments& arguments, ProgressBar& bar) {
   const auto config =
       arguments.machine.empty() ? machine_of_options(arguments) : load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   const auto trackers = trackers_of(arguments, config->machine);
-  if (!trackers) return tl::make_unexpected(trackers.error());
+  ABBE_TRY(trackers);
   auto run = run_of(arguments, *config);
-  if (!run) return tl::make_unexpected(run.error());
+  ABBE_TRY(run);
 
   const otf::PathBudget budget = budget_of(arguments, run->machine);
   PathPlan plan{.run = *run};
   plan.run.tracker_m = trackers->front();
   if (!arguments.path.empty()) {
     auto path = path_of_file(arguments.path);
-    if (!path) return tl::make_unexpected(path.error());
+    ABBE_TRY(path);
     plan.path = *std::move(path);
   } else {
     if (trackers->size() > 1) {
       auto compared = compare_trackers(plan.run, *trackers, budget);
-      if (!compared) return tl::make_unexpected(compared.error());
+      ABBE_TRY(compared);
       plan.trackers = *std::move(compared);
     }
     const auto best = otf::plan(plan.run, budget,
@@ -206,8 +206,7 @@ double stand_s(const otf::PlannedRun& run) {
 Result<std::vector<std::string>> write_plan(const PathPlan& plan,
                                             const PlanOtfArguments& arguments) {
   const std::filesystem::path folder = arguments.out;
-  if (auto made = create_folder(folder, NewFolder::OfTheCaller); !made)
-    return tl::make_unexpected(made.error());
+  ABBE_TRY(create_folder(folder, NewFolder::OfTheCaller));
   std::vector<std::pair<std::string, std::string>> files{
       {"path.csv", to_path_csv(plan.path, plan.run.drive.feed_m_per_s)},
       {"map.csv", to_map_csv(plan.prediction)},
@@ -220,8 +219,7 @@ Result<std::vector<std::string>> write_plan(const PathPlan& plan,
 
   std::vector<std::string> written;
   for (const auto& [name, text] : files) {
-    if (auto done = replace_file(folder / name, text); !done)
-      return tl::make_unexpected(done.error());
+    ABBE_TRY(replace_file(folder / name, text));
     written.push_back(name);
   }
   return written;

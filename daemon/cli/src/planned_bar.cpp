@@ -11,6 +11,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "vector_option.hpp"
 
@@ -48,7 +49,7 @@ Result<mfb::PlanTask> task_of(const PlanMfbArguments& arguments, const PlanInput
   mfb::PlanTask task{.bar = inputs.bar, .machine = inputs.machine};
   for (const auto& text : arguments.styli) {
     const auto stylus = parse_stylus(text, inputs.machine.chain);
-    if (!stylus) return tl::make_unexpected(stylus.error());
+    ABBE_TRY(stylus);
     task.styli.push_back(*stylus);
   }
   task.settings.tip_radius_m = arguments.tip_radius_mm / kMmPerM;
@@ -77,7 +78,7 @@ Result<std::optional<mfb::RotaryTable>> table_of(const PlanMfbArguments& argumen
                          .swivel = arguments.swivel == "A" ? calib::Axis::X : calib::Axis::Y};
   if (!arguments.rotary_at.empty()) {
     const auto at = parse_mm("--rotary-at", arguments.rotary_at);
-    if (!at) return tl::make_unexpected(at.error());
+    ABBE_TRY(at);
     table.centre_m = *at;
   }
   return std::optional{table};
@@ -127,19 +128,18 @@ Result<BarPlan> predicted(BarPlan plan, const PlanMfbArguments& arguments,
 
 Result<PlanInputs> read_inputs(const PlanMfbArguments& arguments) {
   const auto config = load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
-  if (auto valid = check_bar_machine(arguments.machine, config->machine); !valid)
-    return tl::make_unexpected(valid.error());
+  ABBE_TRY(config);
+  ABBE_TRY(check_bar_machine(arguments.machine, config->machine));
   const auto machine = mfb_machine(config->machine);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
   const auto bar = read_bar_toml(arguments.bar);
-  if (!bar) return tl::make_unexpected(bar.error());
+  ABBE_TRY(bar);
   return PlanInputs{config->machine.name, *machine, bar->bar};
 }
 
 Result<BarPlan> judged_file(const PlanMfbArguments& arguments, const PlanInputs& inputs) {
   const auto file = read_bar_plan_toml(arguments.check, inputs.bar);
-  if (!file) return tl::make_unexpected(file.error());
+  ABBE_TRY(file);
   BarPlan plan;
   plan.set = file->source.name;
   plan.plan = file->plan;
@@ -149,9 +149,9 @@ Result<BarPlan> judged_file(const PlanMfbArguments& arguments, const PlanInputs&
 Result<BarPlan> planned(const PlanMfbArguments& arguments, const PlanInputs& inputs,
                         ProgressBar& bar) {
   const auto task = task_of(arguments, inputs);
-  if (!task) return tl::make_unexpected(task.error());
+  ABBE_TRY(task);
   const auto table = table_of(arguments, *task);
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   std::optional<calib::Vector3> centre_m;
   if (*table) centre_m = (*table)->centre_m;
   auto set = mfb::named_set(*mfb::set_named(arguments.set), *task, centre_m);

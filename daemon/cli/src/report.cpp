@@ -15,6 +15,7 @@
 #include "abbe/report/calibration_certificate.hpp"
 #include "abbe/report/model_report.hpp"
 #include "abbe/report/verdict_in_words.hpp"
+#include "abbe/result/try.hpp"
 #include "certificate_file.hpp"
 #include "commands.hpp"
 #include "force_option.hpp"
@@ -40,20 +41,20 @@ Result<ReportSubject> subject_named(const std::string& name, const ReportArgumen
   Result<ReportSubject> subject = [&]() -> Result<ReportSubject> {
     if (names_a_file(name)) {
       auto document = read_model(name);
-      if (!document) return tl::make_unexpected(document.error());
+      ABBE_TRY(document);
       return ReportSubject{.document = *std::move(document)};
     }
     const auto store = open_store(arguments.store);
-    if (!store) return tl::make_unexpected(store.error());
+    ABBE_TRY(store);
     const auto id = id_named(*store, name);
-    if (!id) return tl::make_unexpected(id.error());
+    ABBE_TRY(id);
     return report_subject(*store, *id);
   }();
   if (!subject) return subject;
   auto machine = machine_hash_of(arguments.store);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
   const auto forced = forced_by(arguments.force);
-  if (!forced) return tl::make_unexpected(forced.error());
+  ABBE_TRY(forced);
   subject->details = details;
   subject->machine_hash = *std::move(machine);
   subject->forced = *forced;
@@ -64,9 +65,9 @@ Result<ReportSubject> subject_named(const std::string& name, const ReportArgumen
 Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subject,
                                                      const ReportArguments& arguments) {
   const auto store = open_store(arguments.store);
-  if (!store) return tl::make_unexpected(store.error());
+  ABBE_TRY(store);
   const auto entries = store->list();
-  if (!entries) return tl::make_unexpected(entries.error());
+  ABBE_TRY(entries);
   std::vector<ReportSubject> models;
   for (const StoreEntry& entry : *entries) {
     if (!entry.fault.empty()) {
@@ -75,7 +76,7 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
     }
     if (entry.machine != subject.document.machine) continue;
     auto model = report_subject(*store, entry.id);
-    if (!model) return tl::make_unexpected(model.error());
+    ABBE_TRY(model);
     models.push_back(*std::move(model));
   }
   if (models.empty())
@@ -101,12 +102,12 @@ Result<ReportSubject> other_subject(const std::string& option, const std::string
 Result<std::string> page_of(const ReportSubject& subject, const ReportArguments& arguments) {
   if (!arguments.compare.empty()) {
     const auto other = other_subject("--compare", arguments.compare, subject, arguments);
-    if (!other) return tl::make_unexpected(other.error());
+    ABBE_TRY(other);
     return comparison_report(subject, *other);
   }
   if (arguments.trend) {
     const auto models = models_of_machine(subject, arguments);
-    if (!models) return tl::make_unexpected(models.error());
+    ABBE_TRY(models);
     return trend_report(*models);
   }
   return model_report(subject);
@@ -116,14 +117,14 @@ Result<std::string> certificate_of(const ReportSubject& subject, const ReportArg
   std::optional<ReportSubject> as_left;
   if (!arguments.as_left.empty()) {
     auto other = other_subject("--as-left", arguments.as_left, subject, arguments);
-    if (!other) return tl::make_unexpected(other.error());
+    ABBE_TRY(other);
     as_left = *std::move(other);
   }
   return calibration_certificate(subject, as_left);
 }
 
 Result<void> write_file(const std::string& file, std::string_view text) {
-  if (auto done = replace_file(file, text); !done) return done;
+  ABBE_TRY(replace_file(file, text));
   fmt::print("written     {}\n", file);
   return {};
 }
@@ -162,17 +163,16 @@ Result<void> write_report(const ReportArguments& arguments) {
   CertificateDetails details;
   if (!arguments.details.empty()) {
     auto read = read_certificate_toml(arguments.details);
-    if (!read) return tl::make_unexpected(read.error());
+    ABBE_TRY(read);
     details = *std::move(read);
   }
   details.now = actor_now({}).when;
   const auto subject = subject_named(arguments.model, arguments, details);
-  if (!subject) return tl::make_unexpected(subject.error());
+  ABBE_TRY(subject);
   const std::string out = arguments.out.empty() ? file_name(*subject, arguments) : arguments.out;
   const std::array<std::filesystem::path, 3> written{out, arguments.dcc, arguments.pdf};
-  if (auto own = require_own_files(files_read(arguments), written); !own) return own;
-  for (const auto& file : written)
-    if (auto place = file.empty() ? Result<void>{} : require_place_of(file); !place) return place;
+  ABBE_TRY(require_own_files(files_read(arguments), written));
+  for (const auto& file : written) ABBE_TRY(file.empty() ? Result<void>{} : require_place_of(file));
 
   if (auto wrong = contradictory_details(*subject); arguments.dcc.empty() && !wrong.empty())
     return tl::make_unexpected(
@@ -180,18 +180,17 @@ Result<void> write_report(const ReportArguments& arguments) {
 
   // Everything is made before the first file is written.
   const auto page = page_of(*subject, arguments);
-  if (!page) return tl::make_unexpected(page.error());
+  ABBE_TRY(page);
   Result<std::string> certificate{std::string{}};
   if (!arguments.dcc.empty()) certificate = certificate_of(*subject, arguments);
-  if (!certificate) return tl::make_unexpected(certificate.error());
+  ABBE_TRY(certificate);
 
   if (const auto verdict = verdict_in_words(*subject); verdict.signal != Signal::Green)
     fmt::print("verdict     {}\n", verdict.text);
-  if (auto done = write_file(out, *page); !done) return done;
-  if (!arguments.dcc.empty())
-    if (auto done = write_file(arguments.dcc, *certificate); !done) return done;
+  ABBE_TRY(write_file(out, *page));
+  if (!arguments.dcc.empty()) ABBE_TRY(write_file(arguments.dcc, *certificate));
   if (arguments.pdf.empty()) return {};
-  if (auto done = write_pdf(*page, arguments.pdf); !done) return done;
+  ABBE_TRY(write_pdf(*page, arguments.pdf));
   fmt::print("written     {}\n", arguments.pdf);
   return {};
 }

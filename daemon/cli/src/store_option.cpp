@@ -10,6 +10,7 @@
 #include "abbe/config/config.hpp"
 #include "abbe/model/machine_identity.hpp"
 #include "abbe/model/stored_model.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 Result<fs::path> folder_of(const StoreOption& where) {
   if (where.config.empty()) return fs::path{where.folder};
   const auto config = load_config(where.config);
-  if (!config) return tl::unexpected(config.error());
+  ABBE_TRY(config);
   return config->daemon.models_dir();
 }
 
@@ -34,7 +35,7 @@ void add_store_options(CLI::App& command, StoreOption& where) {
 
 Result<ModelStore> open_store(const StoreOption& where) {
   const auto folder = folder_of(where);
-  if (!folder) return tl::unexpected(folder.error());
+  ABBE_TRY(folder);
 
   std::error_code seen;
   const bool exists = fs::is_directory(*folder, seen);
@@ -56,7 +57,7 @@ Result<std::string> id_named(const ModelStore& store, const std::string& name) {
   if (name != "active") return store.find(name);
 
   const auto active = store.active_id();
-  if (!active) return tl::make_unexpected(active.error());
+  ABBE_TRY(active);
   if (*active) return **active;
   return fail(ErrorCode::Refused,
               "no model is active; `abbe model list` lists the models, `abbe model activate ID` "
@@ -79,31 +80,31 @@ std::filesystem::path file_of_model(const std::string& name, const StoreOption& 
 Result<std::optional<std::string>> machine_hash_of(const StoreOption& where) {
   if (where.config.empty()) return std::nullopt;
   const auto config = load_config(where.config);
-  if (!config) return tl::unexpected(config.error());
+  ABBE_TRY(config);
   return machine_hash(*config);
 }
 
 Result<FoundModel> found_model(const std::string& name, const StoreOption& where) {
   auto machine = machine_hash_of(where);
-  if (!machine) return tl::make_unexpected(machine.error());
+  ABBE_TRY(machine);
   if (names_a_file(name)) {
     auto document = read_model(name);
-    if (!document) return tl::make_unexpected(document.error());
+    ABBE_TRY(document);
     return FoundModel{*std::move(document), {}, *std::move(machine)};
   }
   const auto store = open_store(where);
-  if (!store) return tl::make_unexpected(store.error());
+  ABBE_TRY(store);
   const auto id = id_named(*store, name);
-  if (!id) return tl::make_unexpected(id.error());
+  ABBE_TRY(id);
   auto stored = stored_model(*store, *id);
-  if (!stored) return tl::make_unexpected(stored.error());
+  ABBE_TRY(stored);
   return FoundModel{std::move(stored->document), std::move(stored->events), *std::move(machine),
                     identity_doubt(*store, *id, marks_of_this_computer())};
 }
 
 Result<ModelDocument> model_named(const std::string& name, const StoreOption& where) {
   auto found = found_model(name, where);
-  if (!found) return tl::make_unexpected(found.error());
+  ABBE_TRY(found);
   return std::move(found->document);
 }
 

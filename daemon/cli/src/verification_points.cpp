@@ -11,6 +11,7 @@
 #include "abbe/config/json_vector.hpp"
 #include "abbe/pipeline/standstill_points.hpp"
 #include "abbe/replay/replay.hpp"
+#include "abbe/result/try.hpp"
 #include "interruption.hpp"
 #include "opened_recording.hpp"
 #include "terminal.hpp"
@@ -39,13 +40,12 @@ Result<std::string> poll_points(const std::filesystem::path& socket, const json&
   const auto answer = ask_daemon(
       socket,
       {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
-  if (!answer) return tl::make_unexpected(answer.error());
+  ABBE_TRY(answer);
   for (const json& point : answer->at("points")) {
     out.points.push_back({vector_of(point.at("reading_m")), vector_of(point.at("tracker_m"))});
     print_point(out.points.size(), point);
   }
-  if (!answer->at("points").empty())
-    if (const auto kept = keep(out); !kept) return tl::make_unexpected(kept.error());
+  if (!answer->at("points").empty()) ABBE_TRY(keep(out));
   return answer->value("stopped", std::string{});
 }
 
@@ -63,7 +63,7 @@ Result<LivePoints> points_so_far(VerificationFile& points, const std::string& ma
 
 Result<LivePoints> points_of_recording(const std::string& file) {
   const auto recording = open_recording(file);
-  if (!recording) return tl::make_unexpected(recording.error());
+  ABBE_TRY(recording);
   const Config& config = recording->config;
   if (const auto possible = check_verification(config); !possible)
     return fail(ErrorCode::DataInsufficient, fmt::format("{}: {}", file, possible.error().text));
@@ -74,7 +74,7 @@ Result<LivePoints> points_of_recording(const std::string& file) {
       replay(recording->reader, config,
              {.progress = [&bar](double share) { bar.show("replaying", share); },
               .snapshots = [&standstills](const protocol::Snapshot& s) { standstills.take(s); }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
+  ABBE_TRY(replayed);
   standstills.finish();
 
   LivePoints out{{recording->source, {}, {}}, {}, config.machine.name};
@@ -89,7 +89,7 @@ Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::si
                                     const Keep& keep,
                                     const std::function<Result<void>(const std::string&)>& accept) {
   const auto begun = ask_daemon(socket, {{"do", "verification"}, {"step", "begin"}});
-  if (!begun) return tl::make_unexpected(begun.error());
+  ABBE_TRY(begun);
   const json number = begun->at("number");
   const auto machine = begun->value("machine", std::string{});
   VerificationFile out;

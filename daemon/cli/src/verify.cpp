@@ -18,6 +18,7 @@
 #include "abbe/calib/fit/points_off.hpp"
 #include "abbe/cli/verification_report.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
@@ -58,13 +59,13 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
   verify::Options options;
   if (!arguments.origin.empty()) {
     const auto origin = parse_mm("--origin-mm", arguments.origin);
-    if (!origin) return tl::make_unexpected(origin.error());
+    ABBE_TRY(origin);
     options.origin_m = *origin;
   }
 
   if (!arguments.grid.empty()) {
     const auto step = parse_mm("--grid-mm", arguments.grid);
-    if (!step) return tl::make_unexpected(step.error());
+    ABBE_TRY(step);
     if (!(step->minCoeff() > 0.0))
       return fail(ErrorCode::Usage,
                   fmt::format("--grid-mm \"{}\": must be positive", arguments.grid));
@@ -80,13 +81,13 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
 /// evaluation does not lose the measurement.
 Result<void> keep(const VerifyArguments& arguments, const VerificationFile& points) {
   if (arguments.out.empty()) return {};
-  if (auto made = create_folder(arguments.out); !made) return made;
+  ABBE_TRY(create_folder(arguments.out));
   const auto file = std::filesystem::path(arguments.out) / "verification.csv";
   return replace_file(file, to_verification_csv(points.points));
 }
 
 Result<LivePoints> from_file(Result<VerificationFile> points) {
-  if (!points) return tl::make_unexpected(points.error());
+  ABBE_TRY(points);
   return LivePoints{std::move(*points), {}, {}};
 }
 
@@ -102,12 +103,12 @@ Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMac
   const auto accept = [&](const std::string& machine) -> Result<void> {
     if (!machine.empty()) machines.push_back(of_points(arguments, machine));
     auto found = require_same_machine("verify", machines, arguments.other_machine);
-    if (!found) return tl::make_unexpected(found.error());
+    ABBE_TRY(found);
     different = *std::move(found);
     return {};
   };
   if (!arguments.points.empty()) {
-    if (auto accepted = accept({}); !accepted) return tl::make_unexpected(accepted.error());
+    ABBE_TRY(accept({}));
     return from_file(read_verification_csv(arguments.points));
   }
 
@@ -118,13 +119,13 @@ Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMac
   if (!arguments.recording.empty()) {
     auto points = points_of_recording(arguments.recording);
     if (!points) return points;
-    if (auto done = accept(points->machine); !done) return tl::make_unexpected(done.error());
-    if (auto done = keep_them(points->file); !done) return tl::make_unexpected(done.error());
+    ABBE_TRY(accept(points->machine));
+    ABBE_TRY(keep_them(points->file));
     return points;
   }
 
   const auto socket = socket_path({arguments.socket, arguments.store.config});
-  if (!socket) return tl::make_unexpected(socket.error());
+  ABBE_TRY(socket);
   return points_of_daemon(*socket, arguments.count, keep_them, accept);
 }
 
@@ -196,30 +197,30 @@ std::vector<std::string> off_with_model(const VerificationFile& file,
 /// the cause of its failure.
 Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Error>& cut_short) {
   const auto options = options_of(arguments);
-  if (!options) return tl::make_unexpected(options.error());
+  ABBE_TRY(options);
   auto found = found_model(arguments.models.front(), arguments.store);
-  if (!found) return tl::make_unexpected(found.error());
+  ABBE_TRY(found);
   ModelDocument* const document = &found->document;
   const auto tool_m = tool_of(arguments.tool, document->model);
-  if (!tool_m) return tl::make_unexpected(tool_m.error());
+  ABBE_TRY(tool_m);
 
   Verification v;
 
   if (!arguments.planes.empty()) {
     const auto planes = parse_mm("--planes-mm", arguments.planes);
-    if (!planes) return tl::make_unexpected(planes.error());
+    ABBE_TRY(planes);
     v.planes_m = *planes;
   }
 
   const auto machine = of_machine(arguments.models.front(), *found);
   std::string different;
   auto points = points_of(arguments, {machine}, different);
-  if (!points) return tl::make_unexpected(points.error());
+  ABBE_TRY(points);
   cut_short = std::move(points->cut_short);
 
   VerificationFile& file = points->file;
   auto observed = observed_in(arguments, file);
-  if (!observed) return tl::make_unexpected(observed.error());
+  ABBE_TRY(observed);
   auto compared = verify::compare(*observed, document->model, *tool_m, *options);
   if (!compared) return tl::make_unexpected(error_of(compared.error()));
 
@@ -324,10 +325,8 @@ void print_summary(const VerifyOutcome& outcome, const VerifyArguments& argument
 
 Result<void> write_outputs(const std::filesystem::path& folder, const VerifyOutcome& outcome) {
   if (folder.empty()) return {};
-  if (auto made = create_folder(folder); !made) return made;
-  if (auto done = replace_file(folder / "grid.csv", to_grid_csv(outcome.verification.comparison));
-      !done)
-    return done;
+  ABBE_TRY(create_folder(folder));
+  ABBE_TRY(replace_file(folder / "grid.csv", to_grid_csv(outcome.verification.comparison)));
   return replace_file(folder / "report.html",
                       verification_report(outcome.document, outcome.verification));
 }

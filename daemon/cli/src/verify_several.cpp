@@ -12,6 +12,7 @@
 #include "abbe/calib/verify/compare.hpp"
 #include "abbe/cli/verification_report.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/result/try.hpp"
 #include "effect_name.hpp"
 #include "figures.hpp"
 #include "same_machine.hpp"
@@ -109,9 +110,9 @@ Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& nam
   std::vector<NamedModel> models;
   for (const std::string& name : names) {
     auto found = found_model(name, store);
-    if (!found) return tl::make_unexpected(found.error());
+    ABBE_TRY(found);
     const auto tool_m = tool_of(tool, found->document.model);
-    if (!tool_m) return tl::make_unexpected(tool_m.error());
+    ABBE_TRY(tool_m);
     auto cautions = cautions_of(*found);
     auto machine = of_machine(name, *found).machine;
     models.push_back(
@@ -134,7 +135,7 @@ Result<int> verify_several(const std::vector<NamedModel>& models,
                            const verify::Observations& observed, const SeveralOptions& options) {
   const verify::Observations common = inside_all(observed, models);
   const auto all = predictions(models, common);
-  if (!all) return tl::make_unexpected(all.error());
+  ABBE_TRY(all);
   if (options.json) {
     print_predictions_json(*all, observed, common, options.different_machines);
   } else {

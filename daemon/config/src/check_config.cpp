@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "config_kind.hpp"
 #include "readers.hpp"
@@ -166,9 +167,9 @@ std::vector<std::string> warnings_of(const toml::table& table, const Config& con
 
 Result<CheckedConfig> check_config(const fs::path& file, int cpus) {
   const auto text = read_configuration_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   const auto table = parse_toml(*text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   Faults faults(file.string(), kMostConfigFaults);
   Section root(&*table, "", {1, 1}, faults);
 

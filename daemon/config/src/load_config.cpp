@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "config_kind.hpp"
 #include "readers.hpp"
@@ -39,7 +40,7 @@ namespace {
 
 Result<Config> parse(std::string_view text, const std::filesystem::path& file, Origin origin) {
   const auto table = parse_toml(text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   Faults faults(file.string(), kMostConfigFaults);
   Section root(&*table, "", {1, 1}, faults, origin);
   auto config = read_all(root, file.parent_path());
@@ -59,7 +60,7 @@ Result<Config> parse_recorded_config(std::string_view text, const std::filesyste
 
 Result<Config> load_config(const std::filesystem::path& file) {
   const auto text = read_configuration_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_config(*text, file);
 }
 

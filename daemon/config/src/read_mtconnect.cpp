@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "readers.hpp"
 
@@ -33,9 +34,9 @@ MtconnectConfig read_mtconnect(Section section) {
 
 Result<MtconnectSettings> load_mtconnect_settings(const std::filesystem::path& file) {
   const auto text = read_configuration_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   const auto table = parse_toml(*text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
 
   Faults faults(file.string(), kMostConfigFaults);
   Section root(&*table, "", {1, 1}, faults);

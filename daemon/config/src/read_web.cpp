@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <netinet/in.h>
 
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "readers.hpp"
 
@@ -58,9 +59,9 @@ WebConfig read_web(Section section, const std::filesystem::path& base) {
 
 Result<WebSettings> load_web_settings(const std::filesystem::path& file) {
   const auto text = read_configuration_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   const auto table = parse_toml(*text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   Faults faults(file.string(), kMostConfigFaults);
   Section root(&*table, "", {1, 1}, faults);
   WebSettings settings{.config = read_all(root, file.parent_path()), .web = {}};

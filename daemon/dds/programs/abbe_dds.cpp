@@ -25,6 +25,7 @@
 #include "abbe/dds/twin_watch.hpp"
 #include "abbe/dds/writers.hpp"
 #include "abbe/messages/dds_bridge.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/settings/dds_config.hpp"
 
 namespace {
@@ -102,7 +103,7 @@ abbe::daemon::Result<abbe::daemon::ParticipantConfig> configuration_of(const std
   if (credentials == nullptr || (!std::filesystem::exists(passed_on, error) && !error))
     return abbe::daemon::load_participant_config(file);
   const auto text = abbe::daemon::read_regular_file(passed_on);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return abbe::daemon::parse_participant_config(*text, file);
 }
 
@@ -110,7 +111,7 @@ abbe::daemon::Result<abbe::daemon::ParticipantConfig> configuration_of(const std
 /// supervise names another way: abbed then starts an abbe-dds of its own, or none.
 abbe::daemon::Result<void> take_from_config(Options& options) {
   auto config = configuration_of(options.config);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
   abbe::daemon::use_dds_unit(config->dds, config->runtime_dir, true);
   if (config->dds.supervise != abbe::daemon::Supervise::Systemd) {
     return abbe::daemon::fail(ErrorCode::Refused,

@@ -24,6 +24,7 @@
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
 #include "abbe/messages/error_lattice.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/settings/dds_config.hpp"
 #include "watched_machines.hpp"
 
@@ -130,14 +131,14 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
                        const std::optional<daemon::KnownErrorsFile>& known) {
   const auto nodes = model.grid();
   if (!options.grid_csv.empty()) {
-    if (auto written = dds::write_grid_csv(options.grid_csv, *nodes); !written) return written;
+    ABBE_TRY(dds::write_grid_csv(options.grid_csv, *nodes));
   }
   if (!known) return {};
   const auto lattice = dds::lattice_of(*nodes);
-  if (!lattice) return tl::make_unexpected(lattice.error());
+  ABBE_TRY(lattice);
   const auto comparison =
       daemon::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
-  if (!comparison) return tl::make_unexpected(comparison.error());
+  ABBE_TRY(comparison);
   print_comparison(options, *comparison, model.state()->model_id());
   return {};
 }
@@ -167,7 +168,7 @@ std::filesystem::path subscriber_keys(const std::filesystem::path& daemon_keys) 
 /// precedence over the file.
 Result<void> take_from_config(Options& options) {
   auto config = daemon::load_participant_config(options.config);
-  if (!config) return tl::make_unexpected(config.error());
+  ABBE_TRY(config);
 
   options.participant.domain = config->dds.domain;
   options.participant.profiles = config->dds.profile;

@@ -5,6 +5,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/dds/received_model.hpp"
 #include "abbe/messages/cdr.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::dds {
 namespace {
@@ -124,7 +125,7 @@ Json fields(const v1::CalibrationEvent& m) {
 template <class T>
 daemon::Result<std::string> line(std::span<const std::byte> payload) {
   const auto value = daemon::decode<T>(payload);
-  if (!value) return tl::make_unexpected(value.error());
+  ABBE_TRY(value);
   Json object{{"topic", daemon::topic_name<T>()}};
   object.update(fields(*value));
   // The text may come from any participant and need not be valid UTF-8.

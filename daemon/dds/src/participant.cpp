@@ -16,6 +16,7 @@
 
 #include "abbe/dds/message_filter.hpp"
 #include "abbe/dds/payload_type.hpp"
+#include "abbe/result/try.hpp"
 #include "builtin_profile.hpp"
 #include "interfaces.hpp"
 
@@ -96,7 +97,7 @@ Result<void> add_security(const ParticipantOptions& options, fast::DomainPartici
   }
   const auto identity =
       daemon::find_dds_identity(options.security, options.role, std::chrono::system_clock::now());
-  if (!identity) return tl::make_unexpected(identity.error());
+  ABBE_TRY(identity);
   for (const auto& [name, value] : daemon::dds_security_properties(*identity))
     qos.properties().properties().emplace_back(name, value);
   return {};
@@ -121,12 +122,11 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   }
 
   auto qos = read_profile(options.profiles);
-  if (!qos) return tl::make_unexpected(qos.error());
+  ABBE_TRY(qos);
 
   // If no interface is up, Fast DDS creates a participant that sends nothing and reports no error.
-  if (auto up = interface_of_profile_is_up(*qos); !up) return tl::make_unexpected(up.error());
-  if (auto secured = add_security(options, *qos); !secured)
-    return tl::make_unexpected(secured.error());
+  ABBE_TRY(interface_of_profile_is_up(*qos));
+  ABBE_TRY(add_security(options, *qos));
 
   // Also where the profile of a site was written before it had this value.
   auto& tries = qos->wire_protocol().builtin.mutation_tries;

@@ -20,6 +20,7 @@
 
 #include "abbe/dds/payload_type.hpp"
 #include "abbe/dds/qos.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::dds {
 namespace {
@@ -140,7 +141,7 @@ Result<Readers> Readers::create(Participant& participant, std::span<const daemon
 
   for (const daemon::Topic t : topics) {
     const auto topic = participant.topic(t);
-    if (!topic) return tl::make_unexpected(topic.error());
+    ABBE_TRY(topic);
     const bool is_state = t == daemon::Topic::ModelState;
     auto* reader =
         subscriber->create_datareader(*topic, reader_qos(t), is_state ? &state->alive : nullptr,

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "abbe/dds/qos.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::dds {
 namespace {
@@ -41,7 +42,7 @@ Result<Writers> Writers::create(Participant& participant) {
 
   for (const auto& traits : daemon::all_topics()) {
     const auto topic = participant.topic(traits.topic);
-    if (!topic) return tl::make_unexpected(topic.error());
+    ABBE_TRY(topic);
     auto* writer = publisher->create_datawriter(*topic, writer_qos(traits.topic));
     if (writer == nullptr) {
       return fail(ErrorCode::Io,

@@ -5,6 +5,7 @@
 #include "abbe/drivers/counter_card/decimation.hpp"
 #include "abbe/drivers/counter_card/receiver.hpp"
 #include "abbe/drivers/sampling/touch_detector.hpp"
+#include "abbe/result/try.hpp"
 #include "card_link.hpp"
 #include "kinds.hpp"
 #include "running.hpp"
@@ -77,7 +78,7 @@ Result<std::unique_ptr<RunningDevices>> start_counter_card(const DeviceStart& st
       run(drivers::CounterCardDevice::create(options, std::move(link), start.time, detector.get()),
           thread_options(config.daemon, "abbe-counters", config.daemon.encoder_priority,
                          config.daemon.encoder_cpu));
-  if (!running) return tl::unexpected(running.error());
+  ABBE_TRY(running);
 
   return std::make_unique<RunningCard>(std::move(detector), std::move(*running), start.first);
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "abbe/devices/device_kind.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -62,7 +63,7 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
       const DeviceKind& kind = device_kinds()[k];
       if (kind.moves != moves) continue;
       auto running = kind.start({.config = config, .time = time, .first = first[k], .left = left});
-      if (!running) return tl::unexpected(running.error());
+      ABBE_TRY(running);
       if (*running == nullptr) continue;
       if (auto* const motion = (*running)->motion()) state->motion = motion;
       if (auto* const tracker = (*running)->orders()) state->tracker = tracker;

@@ -6,6 +6,7 @@
 #include "abbe/drivers/can/encoder_receiver.hpp"
 #include "abbe/drivers/can/socket_can_bus.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
+#include "abbe/result/try.hpp"
 #include "kinds.hpp"
 #include "running.hpp"
 
@@ -68,7 +69,7 @@ Result<std::unique_ptr<RunningDevices>> start_encoder(const DeviceStart& start) 
                          make_bus(*encoder, config.daemon.speed, start.time), start.time),
                      thread_options(config.daemon, "abbe-encoder", config.daemon.encoder_priority,
                                     config.daemon.encoder_cpu));
-  if (!running) return tl::unexpected(running.error());
+  ABBE_TRY(running);
   return std::make_unique<RunningEncoder>(std::move(*running), start.first);
 }
 

@@ -5,6 +5,7 @@
 #include "abbe/drivers/environment/device.hpp"
 #include "abbe/drivers/environment/line.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
+#include "abbe/result/try.hpp"
 #include "kinds.hpp"
 #include "running.hpp"
 
@@ -57,7 +58,7 @@ class RunningEnvironment final : public RunningDevices {
     made->devices_.resize(configured.size());
     made->first_ = start.first;
     for (const auto& devices : devices_of_lines(configured)) {
-      if (auto added = made->add_line(devices, start); !added) return tl::unexpected(added.error());
+      ABBE_TRY(made->add_line(devices, start));
     }
 
     return made;
@@ -93,7 +94,7 @@ class RunningEnvironment final : public RunningDevices {
     // sufficient.
     auto running = run(drivers::EnvironmentLine::create(options, start.time),
                        thread_options(start.config.daemon, "abbe-environ", 0, std::nullopt));
-    if (!running) return tl::unexpected(running.error());
+    ABBE_TRY(running);
 
     for (std::size_t k = 0; k < devices.size(); ++k)
       devices_[devices[k]] = {&running->device->device(k), running->thread.get()};

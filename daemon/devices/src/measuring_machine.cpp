@@ -9,6 +9,7 @@
 #include "abbe/config/stretched.hpp"
 #include "abbe/drivers/ippdme/device.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
+#include "abbe/result/try.hpp"
 #include "kinds.hpp"
 #include "machine_hold.hpp"
 #include "running.hpp"
@@ -148,7 +149,7 @@ Result<std::unique_ptr<RunningDevices>> start_measuring_machine(const DeviceStar
   auto thread = thread_options(config.daemon, "abbe-cmm", 0, std::nullopt);
   thread.wait_at_most = kMostStopDelay;
   auto running = run(drivers::IppDevice::create(options, start.time), std::move(thread));
-  if (!running) return tl::unexpected(running.error());
+  ABBE_TRY(running);
   return std::make_unique<RunningMachine>(std::move(*running), cmm_reads_axes(config), start);
 }
 

@@ -2,6 +2,7 @@
 
 #include "abbe/drivers/counter_card/receiver.hpp"
 #include "abbe/drivers/sampling/mark_watcher.hpp"
+#include "abbe/result/try.hpp"
 #include "card_link.hpp"
 #include "kinds.hpp"
 #include "running.hpp"
@@ -18,7 +19,7 @@ class RunningReferenceCard final : public RunningDevices {
                                                                   const Start& start) {
     auto made = std::make_unique<RunningReferenceCard>();
     auto running = start(made->mark_watcher_);
-    if (!running) return tl::unexpected(running.error());
+    ABBE_TRY(running);
     made->running_ = std::move(*running);
     made->place_ = place;
     return made;

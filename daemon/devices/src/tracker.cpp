@@ -10,6 +10,7 @@
 #include "abbe/config/stretched.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
+#include "abbe/result/try.hpp"
 #include "kinds.hpp"
 #include "running.hpp"
 
@@ -76,7 +77,7 @@ Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) 
   auto running = run(drivers::TrackerDevice::create(options, start.time),
                      thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
                                     config.daemon.tracker_cpu));
-  if (!running) return tl::unexpected(running.error());
+  ABBE_TRY(running);
   return std::make_unique<RunningTracker>(std::move(*running), start.first,
                                           drivers::longest_order(options.session));
 }

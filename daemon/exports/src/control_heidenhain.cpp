@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "abbe/result/try.hpp"
 #include "control_tables.hpp"
 
 namespace abbe::daemon {
@@ -57,17 +58,17 @@ Result<std::vector<double>> numbers_of(const ExportFile& file, const TextTable& 
 Result<void> add_functions(const ExportFile& file, std::size_t input,
                            const ControlSettings& settings, std::vector<AxisFunction>& functions) {
   const auto table = text_table(file);
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   if (table->columns.size() < 2 || table->columns[0] != "NR" || table->columns[1] != "AXISPOS")
     return at_line(file.name, 1, "the first columns must be NR and AXISPOS");
   const auto positions = numbers_of(file, *table, 1);
-  if (!positions) return tl::make_unexpected(positions.error());
+  ABBE_TRY(positions);
 
   for (std::size_t column = 2; column < table->columns.size(); ++column) {
     const auto output = axis_named(settings, table->columns[column]);
     if (!output) return at_line(file.name, 1, "a column is not an axis of the control");
     const auto values = numbers_of(file, *table, column);
-    if (!values) return tl::make_unexpected(values.error());
+    ABBE_TRY(values);
 
     AxisFunction function{input, *output, {}};
     for (std::size_t i = 0; i < values->size(); ++i)
@@ -100,7 +101,7 @@ Result<ControlCorrection> read_com_tables(std::span<const ExportFile> files,
   const auto cma = find("config.cma");
   if (cma == files.end()) return at_line("config.cma", 0, "the file is missing");
   const auto assignment = text_table(*cma);
-  if (!assignment) return tl::make_unexpected(assignment.error());
+  ABBE_TRY(assignment);
   const auto* row = active_row(*assignment);
   if (row == nullptr) return at_line(cma->name, 1, "no row is active");
 
@@ -110,8 +111,7 @@ Result<ControlCorrection> read_com_tables(std::span<const ExportFile> files,
     const auto file = find((*row)[column]);
     if (!input || file == files.end())
       return at_line(cma->name, 1, fmt::format("table {} or its axis is missing", (*row)[column]));
-    if (auto added = add_functions(*file, *input, settings, functions); !added)
-      return tl::make_unexpected(added.error());
+    ABBE_TRY(add_functions(*file, *input, settings, functions));
   }
 
   const double sign = settings.positive_moves;

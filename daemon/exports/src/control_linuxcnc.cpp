@@ -1,6 +1,7 @@
 // LinuxCNC: loader of src/emc/usr_intf/usrmotintf.cc, use in src/emc/motion/control.c.
 #include <fmt/format.h>
 
+#include "abbe/result/try.hpp"
 #include "control_tables.hpp"
 
 namespace abbe::daemon {
@@ -52,7 +53,7 @@ Result<ControlCorrection> read_linuxcnc(std::span<const ExportFile> files) {
   std::array<JointTrim, 3> joints;
   for (std::size_t a = 0; a < 3; ++a) {
     auto joint = read_joint(files[a]);
-    if (!joint) return tl::make_unexpected(joint.error());
+    ABBE_TRY(joint);
     joints[a] = *std::move(joint);
   }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "abbe/result/try.hpp"
 #include "control_tables.hpp"
 
 namespace abbe::daemon {
@@ -173,7 +174,7 @@ template <class Set>
 Result<ControlCorrection> read_tables(const ExportFile& file, const ControlSettings& settings,
                                       std::string_view header, Set set) {
   const auto assignments = assignments_of(file, header);
-  if (!assignments) return tl::make_unexpected(assignments.error());
+  ABBE_TRY(assignments);
   std::map<std::size_t, CompensationTable> tables;
   for (const Assignment& a : *assignments) {
     if (!set(tables, a, settings))
@@ -184,7 +185,7 @@ Result<ControlCorrection> read_tables(const ExportFile& file, const ControlSetti
   std::vector<ActiveTable> active;
   for (const auto& [t, table] : tables) {
     auto found = activated(file, t, table);
-    if (!found) return tl::make_unexpected(found.error());
+    ABBE_TRY(found);
     active.push_back(*std::move(found));
   }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -30,7 +31,7 @@ Result<ExportProof> prove_export(ExportFormat format, std::span<const ExportFile
                                  std::span<const calib::ExportPlace> places,
                                  const calib::CorrectionFunction& held) {
   const auto control = read_as_control(format, files, settings);
-  if (!control) return tl::make_unexpected(control.error());
+  ABBE_TRY(control);
 
   ExportProof proof{places.size(), 0.0};
   for (const calib::ExportPlace& place : places) {

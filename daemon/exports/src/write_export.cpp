@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "writers.hpp"
 
 namespace abbe::daemon {
@@ -117,8 +118,7 @@ Result<std::vector<ExportFile>> write_export(ExportFormat format, const HeldCorr
     return write_csv_grid(*grid, options);
 
   const auto& tables = std::get<calib::HeldTables>(held);
-  if (auto checked = check_nodes(facts_of(format), tables.nodes_m); !checked)
-    return tl::make_unexpected(checked.error());
+  ABBE_TRY(check_nodes(facts_of(format), tables.nodes_m));
   return write_tables(format, tables, options);
 }
 

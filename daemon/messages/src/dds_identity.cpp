@@ -6,6 +6,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/messages/dds_security.hpp"
+#include "abbe/result/try.hpp"
 #include "credentials.hpp"
 
 namespace abbe::daemon {
@@ -78,11 +79,10 @@ Result<DdsIdentity> find_dds_identity(const fs::path& folder, DdsRole role,
                               "`abbe dds keys` and that this user may read it",
                               text.error().text));
     if (name != kCertificate) continue;
-    if (auto valid = check_validity(identity / name, *text, now); !valid)
-      return tl::unexpected(valid.error());
+    ABBE_TRY(check_validity(identity / name, *text, now));
   }
 
-  if (auto secret = check_key_mode(identity / kKey); !secret) return tl::unexpected(secret.error());
+  ABBE_TRY(check_key_mode(identity / kKey));
   return DdsIdentity{identity};
 }
 

@@ -10,6 +10,7 @@
 #include "abbe/base/file_descriptor.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/messages/dds_security.hpp"
+#include "abbe/result/try.hpp"
 #include "credentials.hpp"
 #include "documents.hpp"
 
@@ -59,10 +60,10 @@ struct Issuer {
 Result<void> make_identity(const Issuer& issuer, const std::string& name, DdsRole role) {
   const std::string common_name = role == DdsRole::Daemon ? kDaemonSubject : "abbe-" + name;
   auto identity = make_credentials(common_name, issuer.period, &issuer.authority);
-  if (!identity) return tl::unexpected(identity.error());
+  ABBE_TRY(identity);
   auto permissions =
       sign_document(permissions_document(common_name, role, issuer.period), issuer.authority);
-  if (!permissions) return tl::unexpected(permissions.error());
+  ABBE_TRY(permissions);
 
   const fs::path folder = issuer.folder / name;
   const std::string authority_pem = issuer.authority.certificate_pem();
@@ -88,9 +89,9 @@ Result<Issuer> make_issuer(const DdsKeysOptions& options,
       make_credentials(fmt::format("abbe DDS CA {:%Y-%m-%dT%H:%M:%SZ}",
                                    fmt::gmtime(std::chrono::system_clock::to_time_t(now))),
                        period, nullptr);
-  if (!authority) return tl::unexpected(authority.error());
+  ABBE_TRY(authority);
   auto governance = sign_document(governance_document(), *authority);
-  if (!governance) return tl::unexpected(governance.error());
+  ABBE_TRY(governance);
   return Issuer{options.folder, period, std::move(*authority), std::move(*governance)};
 }
 
@@ -110,9 +111,9 @@ Result<void> make_all(const Issuer& issuer, int subscribers) {
 
 Result<void> make_dds_keys(const DdsKeysOptions& options,
                            std::chrono::system_clock::time_point now) {
-  if (auto free = check_folder_is_empty(options.folder); !free) return free;
+  ABBE_TRY(check_folder_is_empty(options.folder));
   const auto issuer = make_issuer(options, now);
-  if (!issuer) return tl::unexpected(issuer.error());
+  ABBE_TRY(issuer);
   auto made = make_all(*issuer, options.subscribers);
   std::error_code ignored;
   if (!made) fs::remove_all(options.folder, ignored);

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/result/try.hpp"
 #include "dds_frames.hpp"
 #include "retained_payloads.hpp"
 
@@ -206,9 +207,8 @@ void DdsLink::State::send_or_keep(const Frame& frame, const PayloadKey& key) {
 
 Result<DdsLink> DdsLink::listen(const std::filesystem::path& socket, DdsLinkPeer peer) {
   auto listener = listen_unix(socket);
-  if (!listener) return tl::make_unexpected(listener.error());
-  if (auto opened = open_to_group(socket, peer.user); !opened)
-    return tl::make_unexpected(opened.error());
+  ABBE_TRY(listener);
+  ABBE_TRY(open_to_group(socket, peer.user));
   auto state = std::make_unique<State>();
   state->allowed = peer;
   state->path = socket;

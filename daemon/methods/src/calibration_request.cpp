@@ -11,6 +11,7 @@
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/messages/attachment_content.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -74,7 +75,7 @@ void set_from(RecordingAttachment& attachment, protocol::HostTime from) noexcept
 Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment) {
   try {
     const auto parsed = content_of(attachment);
-    if (!parsed) return tl::unexpected(parsed.error());
+    ABBE_TRY(parsed);
     const json& content = *parsed;
     const protocol::HostTime from{
         std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}};

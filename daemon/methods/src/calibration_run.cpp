@@ -3,13 +3,15 @@
 #include <chrono>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::daemon {
 
 Result<Candidate> identify(const CalibrationRun& run, const Config& config,
                            const calib::VolumetricModel* active, const IdentificationWatch& watch) {
   return Methods::visit(run, [&](auto method, const auto& of_method) -> Result<Candidate> {
     auto found = method.identify(of_method, config, active, watch);
-    if (!found) return tl::unexpected(found.error());
+    ABBE_TRY(found);
     return std::move(*found);
   });
 }

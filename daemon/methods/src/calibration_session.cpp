@@ -6,6 +6,8 @@
 #include <utility>
 #include <variant>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::daemon {
 
 namespace {
@@ -51,7 +53,7 @@ Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const 
       std::move(task), [this](auto method, auto&& request) -> Result<PreparedSession> {
         using Options = typename decltype(method)::Options;
         auto made = method.acquire(std::move(request), std::get<Options>(options_));
-        if (!made) return tl::unexpected(made.error());
+        ABBE_TRY(made);
         return PreparedSession{.method = method.kName, .acquisition = std::move(*made)};
       });
 }
@@ -76,7 +78,7 @@ Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from
 
 Result<void> CalibrationSession::start(CalibrationRequest request) {
   auto prepared = prepare(std::move(request.task));
-  if (!prepared) return tl::unexpected(prepared.error());
+  ABBE_TRY(prepared);
   return start(std::move(*prepared), request.from);
 }
 

@@ -17,6 +17,7 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -136,7 +137,7 @@ std::optional<MachineIdentity> identity_from(const json& document) {
 }
 
 Result<void> write_identity(const fs::path& data_dir, const MachineIdentity& identity) {
-  if (auto made = create_folder(data_dir); !made) return made;
+  ABBE_TRY(create_folder(data_dir));
   return replace_file(identity_file(data_dir), indented_json_text(identity_json(identity)) + "\n");
 }
 
@@ -263,9 +264,9 @@ Result<std::optional<MachineIdentity>> read_identity(const fs::path& data_dir) {
   if (!fs::exists(file, seen) && (!seen || seen == std::errc::no_such_file_or_directory))
     return std::optional<MachineIdentity>{};
   const auto text = read_regular_file(file);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
   const auto document = parse_json(*text, file.string(), {.bytes = 1u << 20});
-  if (!document) return tl::unexpected(document.error());
+  ABBE_TRY(document);
 
   const auto damaged = [&file](const std::string& why) {
     return fail(ErrorCode::BadInput,
@@ -286,13 +287,12 @@ Result<std::optional<MachineIdentity>> read_identity(const fs::path& data_dir) {
 Result<MachineIdentity> open_identity(const fs::path& data_dir, const ComputerMarks& here,
                                       protocol::UtcTime now) {
   auto known = read_identity(data_dir);
-  if (!known) return tl::unexpected(known.error());
+  ABBE_TRY(known);
   if (*known) return std::move(**known);
   auto made =
       new_identity(here, {}, {.machine_id = {}, .who = "abbed", .why = "first start", .when = now});
   if (!made) return made;
-  if (auto written = write_identity(data_dir, *made); !written)
-    return tl::unexpected(written.error());
+  ABBE_TRY(write_identity(data_dir, *made));
   return made;
 }
 
@@ -335,7 +335,7 @@ Result<MachineIdentity> decide_identity(const fs::path& data_dir, const Computer
                       .when = decision.when,
                       .store = end_of_store(data_dir)};
   if (decision.action == IdentityAction::Kept && !exists) {
-    if (!known) return tl::unexpected(known.error());
+    ABBE_TRY(known);
     return fail(ErrorCode::Refused, fmt::format("{}: there is no identity to keep; abbed makes it "
                                                 "at its first start",
                                                 identity_file(data_dir).string()));
@@ -349,8 +349,7 @@ Result<MachineIdentity> decide_identity(const fs::path& data_dir, const Computer
     decided->computer = here;
     decided->events.push_back(std::move(event));
   }
-  if (auto written = write_identity(data_dir, *decided); !written)
-    return tl::unexpected(written.error());
+  ABBE_TRY(write_identity(data_dir, *decided));
   return decided;
 }
 

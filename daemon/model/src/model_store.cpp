@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 #include "model_index.hpp"
 #include "store_lock.hpp"
 #include "store_state.hpp"
@@ -27,7 +28,7 @@ Result<StoreState> read_state(const fs::path& folder) {
   std::error_code seen;
   if (fs::status(file, seen).type() == fs::file_type::not_found) return StoreState{};
   const auto text = read_regular_file(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return store_state_from_text(*text, file.string());
 }
 
@@ -128,8 +129,8 @@ Error not_found(const std::string& prefix, const std::vector<std::string>& candi
 
 Result<ModelStore> ModelStore::open(const fs::path& folder) {
   ModelStore store{folder};
-  if (const auto made = store.create(); !made) return tl::make_unexpected(made.error());
-  if (const auto state = read_state(folder); !state) return tl::make_unexpected(state.error());
+  ABBE_TRY(store.create());
+  ABBE_TRY(read_state(folder));
   return store;
 }
 
@@ -153,30 +154,27 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   const ModelVerdict verdict{accepted, reasons};
   const auto write_model_file = [&]() -> Result<void> {
     const ModelDocument judged = with_verdict(document, verdict);
-    if (auto written = replace_file(model_path(id), to_json(judged)); !written) return written;
+    ABBE_TRY(replace_file(model_path(id), to_json(judged)));
     const IndexedModel indexed{id, stamp_of_file(model_path(id)), summary_of(judged)};
     ModelIndex{folder_}.put({&indexed, 1});
     return {};
   };
   if (const auto known = load(id); !known || !same_decision(known->verdict, verdict))
-    if (const auto written = write_model_file(); !written)
-      return tl::make_unexpected(written.error());
+    ABBE_TRY(write_model_file());
   const auto lock = lock_store(folder_, lock_patience_);
-  if (!lock) return tl::make_unexpected(lock.error());
+  ABBE_TRY(lock);
   // remove_old() of another process may have deleted the file meanwhile.
   if (std::error_code seen; !fs::exists(model_path(id), seen) && !seen)
-    if (const auto written = write_model_file(); !written)
-      return tl::make_unexpected(written.error());
+    ABBE_TRY(write_model_file());
   auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
 
   StoreEvent event{StoreAction::Added, id, actor, accepted, std::move(reasons)};
 
   // An equal last event means that the caller repeats a change whose last step failed, for example
   // the fsync of the folder: it is not added twice.
   if (const auto* last = state->last_added(id); last != nullptr && *last == event) return id;
-  if (const auto done = append(folder_, std::move(*state), std::move(event)); !done)
-    return tl::make_unexpected(done.error());
+  ABBE_TRY(append(folder_, std::move(*state), std::move(event)));
 
   return id;
 }
@@ -184,11 +182,11 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
 Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force,
                                   std::string accepted_configuration) {
   const auto lock = lock_store(folder_, lock_patience_);
-  if (!lock) return tl::make_unexpected(lock.error());
+  ABBE_TRY(lock);
   auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   const auto document = load(id);
-  if (!document) return tl::make_unexpected(document.error());
+  ABBE_TRY(document);
   const auto verdict = verdict_on(*state, *document);
   const bool accepted = verdict && verdict->accepted;
   if (!accepted && !force)
@@ -205,9 +203,9 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
 
 Result<void> ModelStore::add_drift(const std::string& id, const StoreActor& actor) {
   const auto lock = lock_store(folder_, lock_patience_);
-  if (!lock) return tl::make_unexpected(lock.error());
+  ABBE_TRY(lock);
   auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   StoreEvent event{StoreAction::Drifted, id, actor, false, {}};
   const bool known =
       std::find(state->events.begin(), state->events.end(), event) != state->events.end();
@@ -218,9 +216,9 @@ Result<void> ModelStore::add_drift(const std::string& id, const StoreActor& acto
 
 Result<std::string> ModelStore::rollback(const StoreActor& actor, const std::string& active) {
   const auto lock = lock_store(folder_, lock_patience_);
-  if (!lock) return tl::make_unexpected(lock.error());
+  ABBE_TRY(lock);
   auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   if (const auto present = state->active(); present != active)
     return fail(ErrorCode::Refused,
                 fmt::format("roll back: model {} is not active ({} is): nothing was changed; look "
@@ -230,11 +228,9 @@ Result<std::string> ModelStore::rollback(const StoreActor& actor, const std::str
   if (stack.size() < 2)
     return fail(ErrorCode::Refused, "roll back: no model was active before the present one");
   const auto& id = stack[stack.size() - 2];
-  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
-  if (const auto done = append(folder_, std::move(*state),
-                               StoreEvent{StoreAction::RolledBack, id, actor, false, {}});
-      !done)
-    return tl::make_unexpected(done.error());
+  ABBE_TRY(load(id));
+  ABBE_TRY(append(folder_, std::move(*state),
+                  StoreEvent{StoreAction::RolledBack, id, actor, false, {}}));
 
   return id;
 }
@@ -243,16 +239,14 @@ Result<std::vector<std::string>> ModelStore::remove_old(const ModelRetention& re
                                                         const StoreActor& actor) {
   if (retention.keep_newest == 0) return std::vector<std::string>{};
   const auto lock = lock_store(folder_, lock_patience_);
-  if (!lock) return tl::make_unexpected(lock.error());
+  ABBE_TRY(lock);
   auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
 
   const auto removed = state->beyond(retention, actor.when);
   for (const auto& id : removed)
     state->events.push_back(StoreEvent{StoreAction::Removed, id, actor, false, {}});
-  if (!removed.empty())
-    if (const auto done = replace_file(state_file_, to_text(*state)); !done)
-      return tl::make_unexpected(done.error());
+  if (!removed.empty()) ABBE_TRY(replace_file(state_file_, to_text(*state)));
 
   // Also the files that an earlier call could not remove.
   for (const auto& [id, event] : state->models()) {
@@ -267,10 +261,10 @@ Result<std::vector<std::string>> ModelStore::remove_old(const ModelRetention& re
 
 Result<std::vector<StoreEntry>> ModelStore::list() const {
   const auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   const auto active = state->active();
   const auto ids = ids_in_store(folder_, *state);
-  if (!ids) return tl::make_unexpected(ids.error());
+  ABBE_TRY(ids);
   auto found = summaries(*this, folder_, *ids);
   const auto models = state->models();
   std::vector<StoreEntry> entries;
@@ -302,19 +296,19 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
 
 Result<std::vector<StoreEvent>> ModelStore::history() const {
   auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   return std::move(state->events);
 }
 
 Result<std::optional<std::string>> ModelStore::active_id() const {
   const auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   return state->active();
 }
 
 Result<std::optional<StoreEvent>> ModelStore::activation() const {
   const auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   return state->activation();
 }
 
@@ -324,14 +318,14 @@ StoreStamp ModelStore::stamp() const noexcept {
 
 Result<std::string> ModelStore::drift() const {
   const auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
+  ABBE_TRY(state);
   return state->drift();
 }
 
 Result<ModelDocument> ModelStore::load(const std::string& id) const {
   const auto file = model_path(id);
   const auto text = read_regular_file(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   auto document = parse_model(*text, file.string());
   if (document && model_id(*document) != id)
     return fail(
@@ -348,12 +342,12 @@ bool ModelStore::holds(const std::string& id, const ModelDocument& document) con
 Result<std::string> ModelStore::find(const std::string& prefix) const {
   if (prefix == "active") {
     const auto active = active_id();
-    if (!active) return tl::make_unexpected(active.error());
+    ABBE_TRY(active);
     return *active ? Result<std::string>{**active} : fail(ErrorCode::Usage, "no model is active");
   }
 
   const auto ids = ids_on_disk(folder_);
-  if (!ids) return tl::make_unexpected(ids.error());
+  ABBE_TRY(ids);
   std::vector<std::string> found;
   for (const auto& id : *ids)
     if (id.starts_with(prefix)) found.push_back(id);

@@ -8,6 +8,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/result/try.hpp"
 #include "model_reader.hpp"
 #include "read_bar_figures.hpp"
 #include "read_misfit.hpp"
@@ -316,8 +317,7 @@ Result<ModelDocument> read_document(ModelReader& in) {
 }  // namespace
 
 Result<ModelDocument> parse_model(std::string_view text, const std::string& file) {
-  if (auto within = check_json(text, file, kModelBounds); !within)
-    return tl::make_unexpected(within.error());
+  ABBE_TRY(check_json(text, file, kModelBounds));
   try {
     const auto root = ModelJson::parse(text);
     ModelReader reader(root, file);
@@ -329,7 +329,7 @@ Result<ModelDocument> parse_model(std::string_view text, const std::string& file
 
 Result<ModelDocument> read_model(const std::filesystem::path& file) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_model(*text, file.string());
 }
 

@@ -10,6 +10,7 @@
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -154,7 +155,7 @@ Result<StoreState> store_state_from_text(std::string_view text, const std::strin
   // nesting depth that to_text() writes.
   const auto parsed =
       parse_json(text, file, {.bytes = 256u << 20, .depth = 8, .values = 20'000'000});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   const json& root = *parsed;
 
   try {

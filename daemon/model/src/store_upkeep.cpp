@@ -16,6 +16,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_store.hpp"
+#include "abbe/result/try.hpp"
 #include "store_lock.hpp"
 #include "store_state.hpp"
 
@@ -81,7 +82,7 @@ void ModelStore::remove_leftovers() const {
 Result<void> ModelStore::rename_damaged_state(protocol::UtcTime now) {
   if (!is_damaged(state_file_)) return {};
   const auto lock = lock_store(folder_, lock_patience_);
-  if (!lock) return tl::make_unexpected(lock.error());
+  ABBE_TRY(lock);
   if (!is_damaged(state_file_)) return {};  // another process repaired it
   const auto renamed = folder_ / (std::string{kDamaged} + date_for_name(now));
   if (::renameat2(AT_FDCWD, state_file_.c_str(), AT_FDCWD, renamed.c_str(), RENAME_NOREPLACE) == 0)

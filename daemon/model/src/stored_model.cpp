@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -37,11 +39,11 @@ StoreEntry entry_of(const ModelDocument& document, const std::vector<StoreEvent>
 // ModelStore::list() would read every model of the store.
 Result<StoredModel> stored_model(const ModelStore& store, const std::string& id) {
   auto document = store.load(id);
-  if (!document) return tl::make_unexpected(document.error());
+  ABBE_TRY(document);
   const auto active = store.active_id();
-  if (!active) return tl::make_unexpected(active.error());
+  ABBE_TRY(active);
   auto history = store.history();
-  if (!history) return tl::make_unexpected(history.error());
+  ABBE_TRY(history);
   std::erase_if(*history, [&id](const StoreEvent& event) { return event.id != id; });
 
   add_events(document->verdict, *history);

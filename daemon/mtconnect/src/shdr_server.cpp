@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/result/try.hpp"
 #include "tcp_socket.hpp"
 
 namespace abbe::mtconnect {
@@ -45,7 +46,7 @@ ShdrServer::ShdrServer(ShdrServerOptions options, Greeting greeting, Log log,
 daemon::Result<ShdrServer> ShdrServer::listen(ShdrServerOptions options, Greeting greeting,
                                               Log log) {
   auto listener = listen_tcp(options.address, options.port);
-  if (!listener) return tl::make_unexpected(listener.error());
+  ABBE_TRY(listener);
   const std::uint16_t port = local_port(listener->get());
   return ShdrServer{std::move(options), std::move(greeting), std::move(log), std::move(*listener),
                     port};

@@ -13,6 +13,7 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/config/capabilities.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -166,7 +167,7 @@ std::string to_text(const CountingState& state) {
 
 Result<CountingState> counting_state_from_text(std::string_view text, std::string_view what) {
   const auto parsed = parse_json(text, what, {.bytes = kMostBytes, .depth = 8, .values = 1000});
-  if (!parsed) return tl::unexpected(parsed.error());
+  ABBE_TRY(parsed);
   try {
     if (const auto schema = parsed->at("schema").get<int>(); schema != kCountingSchema)
       return fail(ErrorCode::BadInput,

@@ -9,6 +9,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/messages/attachment_content.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -139,7 +140,7 @@ RecordingAttachment to_attachment(const DatumState& state) {
 Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment) {
   try {
     const auto parsed = content_of(attachment);
-    if (!parsed) return tl::unexpected(parsed.error());
+    ABBE_TRY(parsed);
     const json& content = *parsed;
     return DatumState{
         .at = protocol::HostTime{std::chrono::nanoseconds{content.at("at_ns").get<std::int64_t>()}},
@@ -159,7 +160,7 @@ RecordingAttachment reference_request(protocol::HostTime from) {
 Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment) {
   try {
     const auto content = content_of(attachment);
-    if (!content) return tl::unexpected(content.error());
+    ABBE_TRY(content);
     const auto ns = content->at("from_ns").get<std::int64_t>();
     return protocol::HostTime{std::chrono::nanoseconds{ns}};
   } catch (const json::exception& e) {
@@ -171,7 +172,7 @@ Result<protocol::HostTime> reference_request_from(const RecordingAttachment& att
 Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) {
   try {
     const auto parsed = content_of(attachment);
-    if (!parsed) return tl::unexpected(parsed.error());
+    ABBE_TRY(parsed);
     const json& content = *parsed;
     return FoundDatum{
         .axis = content.at("axis").get<std::size_t>(),

@@ -9,6 +9,7 @@
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/messages/attachment_content.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -26,7 +27,7 @@ RecordingAttachment to_attachment(const SensorAcceptance& acceptance) {
 Result<SensorAcceptance> sensor_acceptance_from(const RecordingAttachment& attachment) {
   try {
     const auto j = content_of(attachment);
-    if (!j) return tl::unexpected(j.error());
+    ABBE_TRY(j);
     return SensorAcceptance{
         .sensor = j->at("sensor").get<std::string>(),
         .from = protocol::HostTime{std::chrono::nanoseconds{j->at("from_ns").get<std::int64_t>()}},

@@ -12,6 +12,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/messages/attachment_content.hpp"
 #include "abbe/pipeline/sensor_checks.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -87,7 +88,7 @@ RecordingAttachment SensorChecks::to_attachment() const {
 Result<void> SensorChecks::go_on(const RecordingAttachment& attachment) {
   try {
     const auto parsed = content_of(attachment);
-    if (!parsed) return tl::unexpected(parsed.error());
+    ABBE_TRY(parsed);
     for (const json& j : *parsed) {
       for (Sensor& s : sensors_) {
         if (s.options.name != j.at("sensor").get<std::string>() ||

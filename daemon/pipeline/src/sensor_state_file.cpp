@@ -10,6 +10,7 @@
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -52,7 +53,7 @@ Result<RecordingAttachment> left_sensor_state(std::string_view text,
                                               const SensorStateClock& now) {
   const auto parsed =
       parse_json(text, kSensorStateName, {.bytes = kMostStateBytes, .depth = 8, .values = 2000});
-  if (!parsed) return tl::unexpected(parsed.error());
+  ABBE_TRY(parsed);
   try {
     if (parsed->at("schema").get<int>() != kSensorStateSchema)
       return fail(ErrorCode::BadInput, fmt::format("{}: another schema", kSensorStateName));
@@ -66,7 +67,7 @@ Result<RecordingAttachment> left_sensor_state(std::string_view text,
     SensorChecks checks{options};
     const auto read = checks.go_on(
         {std::string{kSensorStateName}, "application/json", json_text(content.at("sensors"))});
-    if (!read) return tl::unexpected(read.error());
+    ABBE_TRY(read);
     checks.shift(shift(then, now));
     return checks.to_attachment();
   } catch (const json::exception& e) {

@@ -13,6 +13,8 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 extern char** environ;
 
 namespace abbe::daemon {
@@ -61,7 +63,7 @@ Result<DdsSupervisor> DdsSupervisor::start(Options options, WallTime now) {
   // subscribers.
   options.arguments.insert(options.arguments.end(), {"--parent", std::to_string(::getpid())});
   DdsSupervisor supervisor(std::move(options));
-  if (auto spawned = supervisor.spawn(now); !spawned) return tl::make_unexpected(spawned.error());
+  ABBE_TRY(supervisor.spawn(now));
   return supervisor;
 }
 

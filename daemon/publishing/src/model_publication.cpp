@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "abbe/messages/cdr.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -22,11 +23,11 @@ Result<ModelPublication> encode_model(const PublishedModel& model, std::string_v
   const Stamp stamp{.machine = machine};
   ModelPublication out;
   auto payload = encoded(model_message(model, stamp), model);
-  if (!payload) return tl::unexpected(payload.error());
+  ABBE_TRY(payload);
   out.model = std::move(*payload);
   for (const auto& slice : grid_messages(model, stamp)) {
     payload = encoded(slice, model);
-    if (!payload) return tl::unexpected(payload.error());
+    ABBE_TRY(payload);
     out.slices.push_back(std::move(*payload));
   }
   return out;

@@ -14,6 +14,7 @@
 
 #include "abbe/protocol/mcap/crc32.hpp"
 #include "abbe/protocol/mcap/reader.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon::recording {
 
@@ -100,7 +101,7 @@ Result<std::vector<std::byte>> LeftFile::bytes(std::uint64_t offset, std::uint64
 Result<std::optional<LeftFile::Head>> LeftFile::head_at(std::uint64_t offset) const {
   if (size_ - offset < mcap::kRecordHeadSize) return std::nullopt;
   const auto head = bytes(offset, mcap::kRecordHeadSize);
-  if (!head) return tl::unexpected(head.error());
+  ABBE_TRY(head);
   Head record{static_cast<mcap::Opcode>(head->front()), offset, 0};
   std::memcpy(&record.length, head->data() + 1, sizeof record.length);
   if (head->front() == std::byte{0} || record.length > size_ - offset - mcap::kRecordHeadSize)
@@ -110,7 +111,7 @@ Result<std::optional<LeftFile::Head>> LeftFile::head_at(std::uint64_t offset) co
 
 Result<void> LeftFile::read(const std::atomic<bool>& stop) {
   const auto magic = bytes(0, std::min<std::uint64_t>(size_, mcap::kMagic.size()));
-  if (!magic) return tl::unexpected(magic.error());
+  ABBE_TRY(magic);
   if (!std::ranges::equal(*magic, Bytes{mcap::kMagic}.first(magic->size())))
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: is not a recording: it does not begin with the MCAP magic",
@@ -123,20 +124,20 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
           ErrorCode::Io,
           fmt::format("{}: not closed: abbed was stopped while it read the file", part_.string()));
     const auto record = head_at(whole_until_);
-    if (!record) return tl::unexpected(record.error());
+    ABBE_TRY(record);
     if (!*record) break;
     if ((*record)->opcode == mcap::Opcode::DataEnd) {
       const auto last = bytes(size_ - mcap::kMagic.size(), mcap::kMagic.size());
-      if (!last) return tl::unexpected(last.error());
+      ABBE_TRY(last);
       complete_ = std::ranges::equal(*last, mcap::kMagic);
       break;  // not complete_: the end is truncated and is rewritten
     }
-    if (auto taken = take(**record); !taken) return taken;
+    ABBE_TRY(take(**record));
     whole_until_ = (*record)->end();
   }
 
   if (complete_) return end_chunk(), Result<void>{};
-  if (auto judged = judge_tail(); !judged) return judged;
+  ABBE_TRY(judge_tail());
   return judge_last_chunk();
 }
 
@@ -147,7 +148,7 @@ Result<void> LeftFile::take(const Head& record) {
     return fail(ErrorCode::BadInput, fmt::format("{}: a record of {} bytes at byte {}",
                                                  part_.string(), record.length, record.offset));
   const auto content = bytes(record.offset + mcap::kRecordHeadSize, record.length);
-  if (!content) return tl::unexpected(content.error());
+  ABBE_TRY(content);
   if (record.opcode == mcap::Opcode::MessageIndex) take_index(record, *content);
   if (record.opcode == mcap::Opcode::Metadata) take_metadata(record, *content);
   if (record.opcode == mcap::Opcode::Attachment) take_attachment(record, *content);
@@ -163,7 +164,7 @@ Result<void> LeftFile::take_chunk(const Head& record) {
   end_chunk();
   const auto head =
       bytes(record.offset + mcap::kRecordHeadSize, std::min(record.length, kChunkHeadBytes));
-  if (!head) return tl::unexpected(head.error());
+  ABBE_TRY(head);
   const auto chunk = mcap::decode_cut_chunk(*head);
   chunk_ = OpenChunk{};
   chunk_->offset = record.offset;
@@ -237,12 +238,12 @@ Result<void> LeftFile::judge_tail() {
   };
 
   const auto zeros = is_zero_from(whole_until_);
-  if (!zeros) return tl::unexpected(zeros.error());
+  ABBE_TRY(zeros);
   if (*zeros) return {};
   if (size_ - whole_until_ > kLargestPiece) return damaged();
 
   const auto tail = bytes(whole_until_, size_ - whole_until_);
-  if (!tail) return tl::unexpected(tail.error());
+  ABBE_TRY(tail);
   if (tail->front() == std::byte{0} || contains_whole_chunk(Bytes{*tail}.subspan(1)))
     return damaged();
   if (tail->front() != std::byte{static_cast<std::uint8_t>(mcap::Opcode::Chunk)} ||
@@ -260,7 +261,7 @@ Result<bool> LeftFile::is_zero_from(std::uint64_t offset) const {
   constexpr std::uint64_t kPiece = 1 << 20;
   while (offset < size_) {
     const auto piece = bytes(offset, std::min(kPiece, size_ - offset));
-    if (!piece) return tl::unexpected(piece.error());
+    ABBE_TRY(piece);
     if (!std::ranges::all_of(*piece, [](std::byte b) { return b == std::byte{0}; })) return false;
     offset += piece->size();
   }
@@ -274,7 +275,7 @@ Result<void> LeftFile::judge_last_chunk() {
   if (chunk_->length > kLargestPiece) return end_chunk(), Result<void>{};
   const auto content =
       bytes(chunk_->offset + mcap::kRecordHeadSize, chunk_->length - mcap::kRecordHeadSize);
-  if (!content) return tl::unexpected(content.error());
+  ABBE_TRY(content);
 
   const auto chunk = mcap::decode<mcap::Chunk>(*content);
   const bool sound = chunk && chunk->head.compression.empty() &&
@@ -318,7 +319,7 @@ Result<void> LeftFile::write_end() {
   if (!complete_) {
     // The order is: first the chunk, then the cut, then the end of the file. After a kill or on a
     // full disk the next start of abbed then finds a file that can still be closed.
-    if (auto done = write(rebuilt_at_, rebuilt_); !done) return done;
+    ABBE_TRY(write(rebuilt_at_, rebuilt_));
     if (::ftruncate(fd_.get(), static_cast<off_t>(whole_until_)) != 0)
       return tl::unexpected(io_error("truncate"));
     mcap::Buffer end;

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "abbe/result/try.hpp"
 #include "left_file.hpp"
 
 namespace abbe::daemon {
@@ -57,9 +58,9 @@ Result<fs::path> take_finished_name(const fs::path& part) {
 Result<std::optional<LeftRecording>> close_one(const fs::path& part,
                                                const std::atomic<bool>& stop) {
   auto file = recording::LeftFile::open(part);
-  if (!file) return tl::unexpected(file.error());
+  ABBE_TRY(file);
   if (!*file) return std::nullopt;
-  if (const auto read = (*file)->read(stop); !read) return tl::unexpected(read.error());
+  ABBE_TRY((*file)->read(stop));
 
   if ((*file)->holds_nothing()) {
     if (::unlink(part.c_str()) != 0)
@@ -67,9 +68,9 @@ Result<std::optional<LeftRecording>> close_one(const fs::path& part,
     return LeftRecording{.file = part};
   }
 
-  if (const auto written = (*file)->write_end(); !written) return tl::unexpected(written.error());
+  ABBE_TRY((*file)->write_end());
   auto finished = take_finished_name(part);
-  if (!finished) return tl::unexpected(finished.error());
+  ABBE_TRY(finished);
 
   return LeftRecording{.file = std::move(*finished), .messages = (*file)->messages()};
 }
@@ -80,7 +81,7 @@ Result<std::vector<LeftRecording>> close_left_recordings(const fs::path& directo
                                                          const std::string& running,
                                                          const std::atomic<bool>& stop) {
   const auto parts = parts_in(directory, running);
-  if (!parts) return tl::unexpected(parts.error());
+  ABBE_TRY(parts);
   std::vector<LeftRecording> closed;
   for (const auto& part : *parts) {
     if (stop) break;

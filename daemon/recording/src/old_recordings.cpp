@@ -7,6 +7,7 @@
 #include <string>
 
 #include "abbe/model/model_store.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -23,9 +24,9 @@ Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   if (!fs::is_directory(folder / "models", error))
     return fail(ErrorCode::Io, fmt::format("list {}: there is no model store", folder.string()));
   const auto store = ModelStore::open(folder);
-  if (!store) return tl::unexpected(store.error());
+  ABBE_TRY(store);
   const auto entries = store->list();
-  if (!entries) return tl::unexpected(entries.error());
+  ABBE_TRY(entries);
 
   for (const auto& entry : *entries) {
     if (!entry.fault.empty()) return fail(ErrorCode::BadInput, entry.fault);
@@ -106,7 +107,7 @@ std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rul
 Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory,
                                                     const fs::path& store, const KeepRule& rule) {
   const auto recordings = recordings_in(directory, rule.running);
-  if (!recordings) return tl::unexpected(recordings.error());
+  ABBE_TRY(recordings);
   std::vector<fs::path> old = outdated(*recordings, rule);
   if (old.empty()) return old;
   const auto named = named_by_models(store);

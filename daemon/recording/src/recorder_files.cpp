@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abbe/messages/recording_info.hpp"
+#include "abbe/result/try.hpp"
 #include "recorder_state.hpp"
 
 namespace abbe::daemon {
@@ -36,7 +37,7 @@ IoResult Recorder::State::write_front(RecordingFile& fresh,
     fresh_summary.add(
         recording::append_attachment(kept.attachment, kept.time_ns, front.size(), front));
   }
-  if (auto written = fresh.append(front); !written) return written;
+  ABBE_TRY(fresh.append(front));
   return fresh.sync();
 }
 
@@ -87,7 +88,7 @@ IoResult Recorder::State::begin_file() {
     recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
   if (part > 0) carry_sensors_on();
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
-  if (!fresh) return tl::unexpected(fresh.error());
+  ABBE_TRY(fresh);
   mcap::SummaryBuilder fresh_summary;
 
   if (auto written = write_front(*fresh, fresh_summary); !written) {
@@ -120,7 +121,7 @@ IoResult Recorder::State::end_file() {
   if (!end_written) {
     mcap::Buffer end;
     summary.finish(file->size(), end);
-    if (auto written = file->append(end); !written) return written;
+    ABBE_TRY(file->append(end));
     end_written = true;
   }
   auto finished = file->finish();

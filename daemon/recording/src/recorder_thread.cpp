@@ -13,6 +13,7 @@
 
 #include "abbe/base/wake_up.hpp"
 #include "abbe/messages/recording_info.hpp"
+#include "abbe/result/try.hpp"
 #include "waiting_blocks.hpp"
 
 namespace abbe::daemon {
@@ -363,7 +364,7 @@ Result<std::unique_ptr<RecorderThread>> RecorderThread::start(RecorderThreadOpti
                                                               RecordingInfo info) {
   auto recorder =
       Recorder::open(options.recorder, std::move(info), Recorder::WallTime::clock::now());
-  if (!recorder) return tl::unexpected(recorder.error());
+  ABBE_TRY(recorder);
   auto state = std::make_unique<State>(std::move(options), std::move(*recorder));
   state->known = state->recorder.status();
   return std::unique_ptr<RecorderThread>{new RecorderThread{std::move(state)}};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/result/try.hpp"
 #include "contents_collector.hpp"
 
 namespace abbe::daemon::recording {
@@ -245,7 +246,7 @@ tl::expected<mcap::Summary, mcap::SummaryError> summary_of(const RecordedBytes& 
   const std::uint64_t begin = file.size() - std::min<std::uint64_t>(file.size(), mcap::kLeastTail);
   if (!tail_of(begin)) return tl::unexpected(mcap::SummaryError::NoMagic);
   const auto footer = mcap::read_footer(bytes, begin);
-  if (!footer) return tl::unexpected(footer.error());
+  ABBE_TRY(footer);
   if (file.size() - footer->summary_start > kLargestRead || !tail_of(footer->summary_start))
     return tl::unexpected(mcap::SummaryError::BadRecord);
   return mcap::read_summary(bytes, footer->summary_start);

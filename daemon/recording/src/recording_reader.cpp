@@ -11,6 +11,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
+#include "abbe/result/try.hpp"
 #include "metadata_checksum.hpp"
 #include "recorded_bytes.hpp"
 #include "recording_contents.hpp"
@@ -145,7 +146,7 @@ bool begins_with_magic(const recording::RecordedBytes& file) {
 
 Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path) {
   auto file = recording::RecordedBytes::open(path);
-  if (!file) return tl::unexpected(file.error());
+  ABBE_TRY(file);
   if (!begins_with_magic(**file)) {
     return fail(ErrorCode::BadInput,
                 fmt::format("read {}: is not an MCAP file: it does not begin with the MCAP magic",
@@ -153,7 +154,7 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
   }
 
   Contents contents = recording::contents_of(**file);
-  if (auto intact = (*file)->intact(); !intact) return tl::unexpected(intact.error());
+  ABBE_TRY((*file)->intact());
   if (contents.messages == 0 && !contents.compression.empty())
     return fail(ErrorCode::BadInput,
                 fmt::format("read {}: its chunks are compressed with {}, which is not supported: "

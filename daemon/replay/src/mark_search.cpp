@@ -3,6 +3,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/reference_session.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -30,7 +31,7 @@ Result<MarkSearch> MarkSearch::of(const RecordingReader& recording, const Config
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kReferenceRequestName) continue;
     const auto from = reference_request_from(attachment);
-    if (!from) return tl::unexpected(from.error());
+    ABBE_TRY(from);
     search.requests_.push_back(*from);
   }
   return search;

@@ -19,6 +19,7 @@
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/pipeline.hpp"
 #include "abbe/recording/recorded_clock.hpp"
+#include "abbe/result/try.hpp"
 #include "live_cycles.hpp"
 #include "mark_search.hpp"
 #include "raw_decoder.hpp"
@@ -143,14 +144,14 @@ Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumStateName) continue;
     const auto state = datum_state_from_attachment(attachment);
-    if (!state) return tl::unexpected(state.error());
+    ABBE_TRY(state);
     datum.go_on(*state);
   }
 
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumName) continue;
     const auto found = datum_from_attachment(attachment);
-    if (!found) return tl::unexpected(found.error());
+    ABBE_TRY(found);
     datum.found(*found);
   }
 
@@ -190,7 +191,7 @@ Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recor
   for (const auto& attachment : recording.attachments()) {
     if (!is_calibration_request(attachment.name)) continue;
     auto request = from_attachment(attachment);
-    if (!request) return tl::unexpected(request.error());
+    ABBE_TRY(request);
     requests.push_back(std::move(*request));
   }
   return requests;
@@ -224,11 +225,11 @@ struct Attached {
 
 Result<Attached> attached_to(const RecordingReader& recording, const Config& config) {
   auto requests = requests_of(recording);
-  if (!requests) return tl::unexpected(requests.error());
+  ABBE_TRY(requests);
   auto datum = datum_of(recording, config);
-  if (!datum) return tl::unexpected(datum.error());
+  ABBE_TRY(datum);
   auto marks = MarkSearch::of(recording, config);
-  if (!marks) return tl::unexpected(marks.error());
+  ABBE_TRY(marks);
   return Attached{std::move(*requests), std::move(*datum), std::move(*marks)};
 }
 
@@ -342,10 +343,10 @@ class Replay : private PipelineObserver {
   [[nodiscard]] Result<void> go_on() {
     for (const auto& attachment : recording_.attachments()) {
       if (attachment.name == kSensorStateName) {
-        if (auto read = pipeline_.go_on(attachment); !read) return read;
+        ABBE_TRY(pipeline_.go_on(attachment));
       } else if (attachment.name == kSensorAcceptedName) {
         auto acceptance = sensor_acceptance_from(attachment);
-        if (!acceptance) return tl::unexpected(acceptance.error());
+        ABBE_TRY(acceptance);
         pipeline_.accept(std::move(*acceptance));
       }
     }
@@ -482,11 +483,11 @@ Result<Config> recorded_config(const RecordingReader& recording, const std::stri
 Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
                             const ReplayOptions& options) {
   auto attached = attached_to(recording, config);
-  if (!attached) return tl::unexpected(attached.error());
+  ABBE_TRY(attached);
   Replay again{recording, config, options, std::move(*attached)};
-  if (const auto begun = again.go_on(); !begun) return tl::unexpected(begun.error());
+  ABBE_TRY(again.go_on());
   auto report = again.run();
-  if (auto intact = recording.intact(); !intact) return tl::unexpected(intact.error());
+  ABBE_TRY(recording.intact());
   return report;
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "abbe/report/model_words.hpp"
+#include "abbe/result/try.hpp"
 #include "certificate_dates.hpp"
 #include "certificate_parts.hpp"
 #include "report_sections.hpp"
@@ -106,10 +107,10 @@ struct UseOfModels {
 
 Result<UseOfModels> use_of_both(const ReportSubject& as_found, const ReportSubject* as_left) {
   auto found = use_of(as_found, "as found");
-  if (!found) return tl::make_unexpected(found.error());
+  ABBE_TRY(found);
   if (as_left == nullptr) return UseOfModels{*std::move(found), {}};
   auto left = use_of(*as_left, "as left");
-  if (!left) return tl::make_unexpected(left.error());
+  ABBE_TRY(left);
   return UseOfModels{*std::move(found), *std::move(left)};
 }
 
@@ -145,7 +146,7 @@ void write_administrative_data(XmlText& out, const ReportSubject& subject,
 Result<void> write_result(XmlText& out, const ReportSubject& subject, State state,
                           const CertificateDetails& details) {
   const auto values = certified_values(subject.document);
-  if (!values) return tl::make_unexpected(values.error());
+  ABBE_TRY(values);
   write_measurement_result(out, subject, *values, state, details);
   return {};
 }
@@ -162,7 +163,7 @@ Result<std::string> calibration_certificate(const ReportSubject& as_found,
               std::move(missing)});
 
   const auto use = use_of_both(as_found, left);
-  if (!use) return tl::make_unexpected(use.error());
+  ABBE_TRY(use);
 
   XmlText out;
   out.open("dcc:digitalCalibrationCertificate",
@@ -173,11 +174,8 @@ Result<std::string> calibration_certificate(const ReportSubject& as_found,
             {"schemaVersion", "3.2.1"}});
   write_administrative_data(out, as_found, left, *use);
   out.open("dcc:measurementResults");
-  if (auto done = write_result(out, as_found, State::AsFound, as_found.details); !done)
-    return tl::make_unexpected(done.error());
-  if (as_left)
-    if (auto done = write_result(out, *as_left, State::AsLeft, as_found.details); !done)
-      return tl::make_unexpected(done.error());
+  ABBE_TRY(write_result(out, as_found, State::AsFound, as_found.details));
+  if (as_left) ABBE_TRY(write_result(out, *as_left, State::AsLeft, as_found.details));
   out.close();
   out.close();
   return out.finish();

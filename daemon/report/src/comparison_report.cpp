@@ -7,6 +7,7 @@
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"
+#include "abbe/result/try.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
@@ -117,9 +118,9 @@ Result<std::string> comparison_report(const ReportSubject& a, const ReportSubjec
                 fmt::format("compare {} and {}: {}", model_id(a.document), model_id(b.document),
                             difference.error().text));
   auto values_a = certified_values(a.document);
-  if (!values_a) return tl::make_unexpected(values_a.error());
+  ABBE_TRY(values_a);
   auto values_b = certified_values(b.document);
-  if (!values_b) return tl::make_unexpected(values_b.error());
+  ABBE_TRY(values_b);
   const Sides sides{a, b, *std::move(values_a), *std::move(values_b)};
 
   HtmlReport page(fmt::format("{}: two models side by side", a.document.machine));

@@ -7,6 +7,7 @@
 #include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"
 #include "abbe/report/space_drawing.hpp"
+#include "abbe/result/try.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
@@ -96,7 +97,7 @@ void add_words(HtmlReport& page, const ModelDocument& document) {
 Result<std::string> model_report(const ReportSubject& subject) {
   const ModelDocument& document = subject.document;
   const auto values = certified_values(document);
-  if (!values) return tl::make_unexpected(values.error());
+  ABBE_TRY(values);
 
   HtmlReport page(fmt::format("{}: geometric calibration", document.machine));
   page.paragraph(fmt::format("Model {}, {}.", model_id(document), method_in_words(document)));

@@ -1,5 +1,6 @@
 #include "abbe/model/machine_identity.hpp"
 #include "abbe/report/model_report.hpp"
+#include "abbe/result/try.hpp"
 
 #include <utility>
 
@@ -15,7 +16,7 @@ ModelInUse in_use(const ReportSubject& subject, ModelPurpose purpose) {
 
 Result<ReportSubject> report_subject(const ModelStore& store, const std::string& id) {
   auto stored = stored_model(store, id);
-  if (!stored) return tl::make_unexpected(stored.error());
+  ABBE_TRY(stored);
   ReportSubject subject{.document = std::move(stored->document),
                         .entry = std::move(stored->entry),
                         .events = std::move(stored->events)};

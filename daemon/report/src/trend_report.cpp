@@ -6,6 +6,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/report/model_words.hpp"
+#include "abbe/result/try.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
@@ -108,7 +109,7 @@ Result<std::string> trend_report(const std::vector<ReportSubject>& models) {
   std::vector<TrendPoint> points;
   for (const ReportSubject& subject : models) {
     auto values = certified_values(subject.document);
-    if (!values) return tl::make_unexpected(values.error());
+    ABBE_TRY(values);
     points.push_back({&subject, *std::move(values), 0.0});
   }
   if (points.empty()) return fail(ErrorCode::DataInsufficient, "trend: there are no models");

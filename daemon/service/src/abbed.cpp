@@ -42,6 +42,7 @@
 #include "abbe/recording/left_recordings.hpp"
 #include "abbe/recording/old_recordings.hpp"
 #include "abbe/recording/recorded_clock.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "abbe/service/control_api.hpp"
 #include "abbe/service/counting_state_thread.hpp"
@@ -214,7 +215,7 @@ struct Abbed::State {
                        .versions = {{"abbe", ABBE_VERSION}}};
     std::ranges::move(recording_rules(), std::back_inserter(info.versions));
     auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
-    if (!opened) return tl::unexpected(opened.error());
+    ABBE_TRY(opened);
     recorder = std::move(*opened);
     if (const auto status = recorder->status(); !status.fault.empty())
       warnings.push_back(fmt::format("nothing is recorded: {}", status.fault));
@@ -253,9 +254,9 @@ struct Abbed::State {
           "abbed; remove this line, and it runs as a user of its own");
     const bool supervised = config.dds.supervise == Supervise::Child;
     const auto peer = dds_peer();
-    if (!peer) return tl::unexpected(peer.error());
+    ABBE_TRY(peer);
     auto link = DdsLink::listen(config.dds.socket, *peer);
-    if (!link) return tl::unexpected(link.error());
+    ABBE_TRY(link);
     auto publishes = publisher_options(config);
     publishes.identity.machine_id = machine_identity->known().machine_id;
     publisher.emplace(std::move(*link), std::move(publishes), utc);
@@ -263,7 +264,7 @@ struct Abbed::State {
     if (!supervised) return {};
     auto started = DdsSupervisor::start(abbe_dds_options(config, options.dds_program, dds_process),
                                         WallTime::clock::now());
-    if (!started) return tl::unexpected(started.error());
+    ABBE_TRY(started);
     supervisor.emplace(std::move(*started));
 
     return {};
@@ -321,7 +322,7 @@ struct Abbed::State {
     std::optional<CountingProgress> left;
     if (left_counting.state) left = left_counting.state->counting.progress;
     auto started = DeviceSet::start(config, time, left);
-    if (!started) return tl::unexpected(started.error());
+    ABBE_TRY(started);
     devices.emplace(std::move(*started));
     const auto refused = devices->warnings();
     warnings.insert(warnings.end(), refused.begin(), refused.end());
@@ -339,7 +340,7 @@ struct Abbed::State {
 
   Result<void> listen_control() {
     auto listener = listen_unix(config.control.socket);
-    if (!listener) return tl::unexpected(listener.error());
+    ABBE_TRY(listener);
     control_listener = std::move(*listener);
     // So that the first requests find the groups of a name service that answers in time.
     const std::array groups{config.control.look_group, config.control.change_group,
@@ -444,7 +445,7 @@ struct Abbed::State {
     writing_sensors =
         run_abandonable([file = sensor_state_file(config.daemon.data_dir),
                          text = sensor_state_text(*checks, sensor_clock())]() -> Result<void> {
-          if (auto made = create_folder(file.parent_path()); !made) return made;
+          ABBE_TRY(create_folder(file.parent_path()));
           return replace_file(file, text);
         });
   }
@@ -589,8 +590,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   for (const auto& directory :
        {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
         state->config.dds.socket.parent_path()}) {
-    if (auto made = create_folder(directory, NewFolder::OfTheCaller); !made)
-      return tl::unexpected(made.error());
+    ABBE_TRY(create_folder(directory, NewFolder::OfTheCaller));
   }
 
   using Step = Result<void> (State::*)();
@@ -599,7 +599,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
        {&State::refuse_second_daemon, &State::open_models, &State::open_machine_identity,
         &State::open_dds, &State::bound_cpu_latency, &State::start_devices,
         &State::start_hub_thread, &State::listen_control, &State::open_recorder, &State::run}) {
-    if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
+    ABBE_TRY(((*state).*step)());
   }
 
   return std::unique_ptr<Abbed>{new Abbed{std::move(state)}};

@@ -9,6 +9,7 @@
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "identification_task.hpp"
 #include "outcome.hpp"
@@ -107,13 +108,13 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
 }
 
 Result<PreparedCalibration> CalibrationService::prepare(CalibrationTask task) const {
-  if (auto valid = check(task); !valid) return tl::unexpected(valid.error());
+  ABBE_TRY(check(task));
   RecordingAttachment attachment = to_attachment(task);
   auto text = std::make_shared<const std::string>(attachment.content);
   const MethodNeeds needs =
       Methods::visit(task, [this](auto method, const auto&) { return method.needs(config_); });
   auto session = session_.prepare(std::move(task));
-  if (!session) return tl::unexpected(session.error());
+  ABBE_TRY(session);
   return PreparedCalibration{std::move(*session), std::move(attachment), needs, std::move(text)};
 }
 
@@ -124,8 +125,7 @@ Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared,
                 fmt::format("calibrate {}: the identification of a cancelled run is still ending",
                             prepared.session.method));
   SessionStatus before = session_.status();
-  if (auto started = session_.start(std::move(prepared.session), now); !started)
-    return tl::unexpected(started.error());
+  ABBE_TRY(session_.start(std::move(prepared.session), now));
   if (before.id != 0) ended_.push_back(std::move(before));
   if (ended_.size() > kEndedKept) ended_.pop_front();
   who_ = who;
@@ -139,7 +139,7 @@ Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared,
 Result<std::uint64_t> CalibrationService::start(CalibrationTask task, const std::string& who,
                                                 HostTime now) {
   auto prepared = prepare(std::move(task));
-  if (!prepared) return tl::unexpected(prepared.error());
+  ABBE_TRY(prepared);
   return start(std::move(*prepared), who, now);
 }
 

@@ -16,6 +16,7 @@
 
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/config/linear_axes.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/service/store_changes.hpp"
 #include "motion_requests.hpp"
 #include "status_reply.hpp"
@@ -111,9 +112,9 @@ Result<void> check_tracker_is_free(const HubParts& parts, const MethodNeeds& nee
 
 Result<OnHub> calibrate(const HubParts& parts, const json& request) {
   auto task = task_from_json(request, &parts.config);
-  if (!task) return tl::unexpected(task.error());
+  ABBE_TRY(task);
   auto prepared = parts.calibration.prepare(std::move(*task));
-  if (!prepared) return tl::unexpected(prepared.error());
+  ABBE_TRY(prepared);
   auto shared = std::make_shared<PreparedCalibration>(std::move(*prepared));
 
   return [shared, by = who(request)](const Hub& hub) {
@@ -133,7 +134,7 @@ constexpr std::chrono::milliseconds kStorePatience{50};
 /// meanwhile no other client of the control socket gets an answer.
 Result<OnHub> answer_change(StoreChanges& changes, const Result<std::uint64_t>& number,
                             std::chrono::milliseconds patience = kStorePatience) {
-  if (!number) return tl::unexpected(number.error());
+  ABBE_TRY(number);
   const auto outcome = changes.outcome(*number, patience);
   json answer{{"ok", true}, {"change", *number}};
   if (outcome) {
@@ -150,7 +151,7 @@ Result<StoreChanges*> changes_of(const HubParts& parts) {
 
 Result<OnHub> activate(const HubParts& parts, const json& request) {
   const auto changes = changes_of(parts);
-  if (!changes) return tl::unexpected(changes.error());
+  ABBE_TRY(changes);
   return answer_change(
       **changes,
       (*changes)->activate({.id = request.at("id").get<std::string>(),
@@ -161,7 +162,7 @@ Result<OnHub> activate(const HubParts& parts, const json& request) {
 
 Result<OnHub> rollback(const HubParts& parts, const json& request) {
   const auto changes = changes_of(parts);
-  if (!changes) return tl::unexpected(changes.error());
+  ABBE_TRY(changes);
   return answer_change(
       **changes, (*changes)->roll_back(
                      {.active = request.at("active").get<std::string>(),
@@ -171,7 +172,7 @@ Result<OnHub> rollback(const HubParts& parts, const json& request) {
 
 Result<OnHub> change(const HubParts& parts, const json& request) {
   const auto changes = changes_of(parts);
-  if (!changes) return tl::unexpected(changes.error());
+  ABBE_TRY(changes);
   return answer_change(**changes, request.at("number").get<std::uint64_t>(),
                        std::chrono::milliseconds{0});  // a client may ask again and again
 }
@@ -213,7 +214,7 @@ Result<std::vector<std::string>> axes_of(const json& request) {
 
 Result<OnHub> reference_here(const HubParts&, const json& request) {
   auto axes = axes_of(request);
-  if (!axes) return tl::unexpected(axes.error());
+  ABBE_TRY(axes);
   return with_reference([axes = std::move(*axes), u = request.value("u", SetDatumHere::kByEye)](
                             ReferenceService& service, const HubParts& parts) {
     return service.set_datum_here(stand_here(parts, axes, u));
@@ -312,7 +313,7 @@ OnHub give_tracker(drivers::TrackerOrder order, std::string by) {
 
 Result<OnHub> tracker_order(const HubParts&, const json& request) {
   auto order = tracker_order_from_json(request);
-  if (!order) return tl::unexpected(order.error());
+  ABBE_TRY(order);
   return give_tracker(std::move(*order), who(request));
 }
 
@@ -384,9 +385,8 @@ Result<Verb::Task> task_of(const json& request, const ControlPeer& peer, const H
                             "nothing here",
                             peer.user));
   const auto verb = verb_of(request);
-  if (!verb) return tl::unexpected(verb.error());
-  if (const auto may = check_role(peer, (*verb)->role, (*verb)->name, parts.config.control); !may)
-    return tl::unexpected(may.error());
+  ABBE_TRY(verb);
+  ABBE_TRY(check_role(peer, (*verb)->role, (*verb)->name, parts.config.control));
   return (*verb)->task;
 }
 

@@ -13,6 +13,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/drift.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/service/calibration_service.hpp"
 
 namespace abbe::daemon {
@@ -87,7 +88,7 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
   auto candidate = identify(run, *config, active ? &active->model : nullptr,
                             {.progress = [this](double share) { state->share = share; },
                              .stopped = [this] { return state->stopped.load(); }});
-  if (!candidate) return tl::unexpected(candidate.error());
+  ABBE_TRY(candidate);
 
   RecordingDigest recording =
       digest.valid() ? digest_of(digest, state->stopped) : RecordingDigest{};
@@ -164,7 +165,7 @@ void IdentificationTask::compare_with_active(JudgedModel& model, const Calibrati
 
 Result<KeptModel> IdentificationTask::operator()() {
   auto judged = judged_model();
-  if (!judged) return tl::unexpected(judged.error());
+  ABBE_TRY(judged);
   const std::shared_ptr<JudgedModel> model = std::move(*judged);
   if (!state->begin_storing(model)) return fail(ErrorCode::Refused, "the model was discarded");
 

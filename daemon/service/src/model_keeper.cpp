@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "abbe/calib/iso/standard_values.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -46,24 +47,24 @@ Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::
                                     const StoreActor& actor, protocol::HostTime now,
                                     const std::atomic<bool>* discarded, const KeptBeside& beside) {
   const auto is_discarded = [discarded] { return discarded != nullptr && *discarded; };
-  if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
+  ABBE_TRY(store_.create());
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
-  if (const auto kept = keep_beside(beside, actor); !kept) return tl::unexpected(kept.error());
+  ABBE_TRY(keep_beside(beside, actor));
   const auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
-  if (!id) return tl::unexpected(id.error());
+  ABBE_TRY(id);
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
   if (!verdict.accepted || beside.hold) return KeptModel{*id, std::nullopt};
-  if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
+  ABBE_TRY(activate_once(*id, actor));
 
   auto active = active_after(*id, document, now);
-  if (!active) return tl::unexpected(active.error());
+  ABBE_TRY(active);
   return KeptModel{*id, std::move(*active)};
 }
 
 Result<void> ModelKeeper::keep_beside(const KeptBeside& beside, const StoreActor& actor) {
   if (beside.run) {
     const auto run = store_.add(*beside.run, beside.run_accepted, beside.run_reasons, actor);
-    if (!run) return tl::unexpected(run.error());
+    ABBE_TRY(run);
   }
   if (beside.drift.empty()) return {};
   return store_.add_drift(beside.drifted_model, {actor.who, beside.drift, actor.when});
@@ -75,14 +76,14 @@ Result<void> ModelKeeper::keep_beside(const KeptBeside& beside, const StoreActor
 Result<ActiveModel> ModelKeeper::active_after(const std::string& id, const ModelDocument& document,
                                               protocol::HostTime now) const {
   const auto activation = store_.activation();
-  if (!activation) return tl::unexpected(activation.error());
+  ABBE_TRY(activation);
   const bool same = *activation && (*activation)->id == id && store_.holds(id, document);
   return same ? active_of(**activation, document, now) : read_active(now);
 }
 
 Result<void> ModelKeeper::activate_once(const std::string& id, const StoreActor& actor) {
   const auto history = store_.history();
-  if (!history) return tl::unexpected(history.error());
+  ABBE_TRY(history);
   const bool done = std::ranges::any_of(*history, [&](const StoreEvent& event) {
     return event.action == StoreAction::Activated && event.id == id && event.actor == actor;
   });
@@ -100,9 +101,9 @@ Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now
 }
 
 Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
-  if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
+  ABBE_TRY(store_.create());
   const auto activation = store_.activation();
-  if (!activation) return tl::unexpected(activation.error());
+  ABBE_TRY(activation);
   ActiveModel active;
 
   if (!*activation) {
@@ -113,7 +114,7 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
 
   auto document = store_.load((*activation)->id);
   const auto drift = store_.drift();
-  if (!drift) return tl::unexpected(drift.error());
+  ABBE_TRY(drift);
   if (document) {
     active = active_of(**activation, std::move(*document), now);
     active.drift = *drift;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -83,7 +84,7 @@ Result<OnHub> begin_touching(const HubParts& parts, const json& request) {
   for (const json& place : request.value("leave", json::array()))
     leave.push_back(place_from(place, false));
   auto job = touch_job(motion_volume(parts.config), std::move(wanted), std::move(leave));
-  if (!job) return tl::unexpected(job.error());
+  ABBE_TRY(job);
 
   return with_touching(
       [shared = std::make_shared<TouchJob>(std::move(*job))](TouchService& service) {
@@ -119,7 +120,7 @@ Result<OnHub> release_machine(const HubParts&, const json&) {
 Result<OnHub> stop_machine(const HubParts& parts, const json&) {
   // On the client's thread: a hub that hangs does not delay AbortE.
   const auto number = parts.devices.stop_machine();
-  if (!number) return tl::unexpected(number.error());
+  ABBE_TRY(number);
   return [number = *number](const Hub& hub) {
     auto* const touching = hub.parts().touching;
     if (touching != nullptr && touching->status().running) (void)touching->cancel();

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -193,7 +195,7 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
   for (const auto& name : here.axes.empty() ? possible : here.axes) {
     places.push_back(static_cast<std::size_t>(
         std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin()));
-    if (auto stands = check_standing(places.back()); !stands) return stands;
+    ABBE_TRY(check_standing(places.back()));
   }
 
   for (const std::size_t place : places) {

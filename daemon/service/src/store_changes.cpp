@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "abbe/result/try.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "outcome.hpp"
 
@@ -27,7 +28,7 @@ Result<std::uint64_t> StoreChanges::activate(Activation asked) {
     auto id = store.find(asked.id);
     if (!id) return id;
     const auto done = store.activate(*id, store_actor(asked.who, asked.why), asked.force);
-    if (!done) return tl::unexpected(done.error());
+    ABBE_TRY(done);
     return id;
   });
 }
@@ -49,7 +50,7 @@ Result<std::uint64_t> StoreChanges::begin(Change change) {
   running_ =
       run_abandonable([folder = store_, change = std::move(change)]() -> Result<std::string> {
         auto store = ModelStore::open(folder);
-        if (!store) return tl::unexpected(store.error());
+        ABBE_TRY(store);
         store->set_lock_timeout(kLockPatience);
         return change(*store);
       });

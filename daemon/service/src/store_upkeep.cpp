@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdio>
 
+#include "abbe/result/try.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "outcome.hpp"
 
@@ -26,7 +27,7 @@ Result<std::vector<std::string>> keep_up(const std::filesystem::path& folder,
       std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
   auto removed = store.remove_old(retention, actor);
   if (!removed) return removed;
-  if (const auto entries = store.list(); !entries) return tl::unexpected(entries.error());
+  ABBE_TRY(store.list());
   return removed;
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "abbe/config/capabilities.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -30,8 +31,7 @@ Result<TouchJob> touch_job(const MotionVolume& volume, std::vector<TouchRequest>
             "touch: {} touches with {} places exceed the limits of one request ({} and {}): "
             "send several requests",
             touches.size(), places, TouchJob::kMostTouches, TouchJob::kMostPlaces));
-  if (const auto inside = check_places(volume, touches, leave); !inside)
-    return tl::unexpected(inside.error());
+  ABBE_TRY(check_places(volume, touches, leave));
   TouchJob job{.touches = std::move(touches), .leave = std::move(leave), .made = {}};
   job.made.reserve(job.touches.size());
 
@@ -42,7 +42,7 @@ Result<void> TouchService::start(TouchJob&& job) {
   const auto stands = where();
   if (!configured_) return tl::unexpected(stands.error());
   if (status_.running) return fail(ErrorCode::Refused, "touch: touches are already running");
-  if (!stands) return tl::unexpected(stands.error());
+  ABBE_TRY(stands);
   status_.running = true;
   status_.asked = job.touches.size();
   status_.reason.clear();

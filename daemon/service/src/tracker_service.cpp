@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "abbe/config/capabilities.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -63,7 +64,7 @@ Result<void> TrackerService::check(const TrackerOrder& order, bool takes_reading
 }
 
 Result<std::uint64_t> TrackerService::start(TrackerOrder order, Asked asked) {
-  if (const auto may = check(order, asked.takes_readings); !may) return tl::unexpected(may.error());
+  ABBE_TRY(check(order, asked.takes_readings));
   order.number = ++number_;
   orders_.push_back({order, std::move(asked.by), asked.now, std::nullopt});
   if (orders_.size() > kKept) orders_.pop_front();

@@ -5,20 +5,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/result/try.hpp"
 #include "abbe/service/background_tasks.hpp"
 
 namespace abbe::daemon {
 
 Result<std::uint64_t> VerificationService::begin() {
-  if (auto possible = check_verification(config_); !possible)
-    return tl::make_unexpected(possible.error());
+  ABBE_TRY(check_verification(config_));
   destroy_in_background(std::exchange(points_, StandstillPoints{standstill_options(config_)}));
   running_ = true;
   return ++number_;
 }
 
 Result<void> VerificationService::end(std::uint64_t number) {
-  if (const auto own = points(number); !own) return tl::make_unexpected(own.error());
+  ABBE_TRY(points(number));
   if (running_) points_.finish();
   running_ = false;
   return {};

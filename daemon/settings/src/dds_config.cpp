@@ -1,6 +1,7 @@
 #include "abbe/settings/dds_config.hpp"
 
 #include "abbe/base/faults.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 
 namespace abbe::daemon {
@@ -46,7 +47,7 @@ void use_dds_unit(DdsConfig& dds, const std::filesystem::path& runtime_dir, bool
 Result<ParticipantConfig> parse_participant_config(std::string_view text,
                                                    const std::filesystem::path& file) {
   const auto table = parse_toml(text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
 
   Faults faults(file.string(), kMostConfigFaults);
   Section root(&*table, "", {1, 1}, faults);
@@ -61,7 +62,7 @@ Result<ParticipantConfig> parse_participant_config(std::string_view text,
 
 Result<ParticipantConfig> load_participant_config(const std::filesystem::path& file) {
   const auto text = read_configuration_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_participant_config(*text, file);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "bar_pattern.hpp"
 #include "expansivity.hpp"
@@ -249,13 +250,13 @@ Bar read_bar(Section& root, const Faults& faults) {
 
 Result<BarFile> read_bar_toml(const std::filesystem::path& file) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_bar_toml(*text, file);
 }
 
 Result<BarFile> parse_bar_toml(std::string_view text, const std::filesystem::path& file) {
   const auto parsed = parse_toml_text(text, file);
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   Faults faults(file.string());
   Section root(&parsed->table, "", {1, 1}, faults);
   Bar bar = read_bar(root, faults);

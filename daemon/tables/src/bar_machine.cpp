@@ -1,6 +1,7 @@
 // The machine of an identification with a Multi-Feature Bar.
 #include <fmt/format.h>
 
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "toml_file.hpp"
 
@@ -10,7 +11,7 @@ Result<void> check_bar_machine(const std::filesystem::path& file, const MachineC
   constexpr std::size_t kFewestCubicNodes = 4;
   if (machine.interpolation == TableInterpolation::Linear) return {};
   const auto parsed = parse_toml_file(file);
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
 
   Faults faults(file.string());
   Section root(&parsed->table, "", {1, 1}, faults);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "toml_file.hpp"
 
@@ -158,14 +159,14 @@ Plan read_plan(Section& root, const toml::table& table, const Bar& bar,
 
 Result<BarPlanFile> read_bar_plan_toml(const std::filesystem::path& file, const Bar& bar) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_bar_plan_toml(*text, file, bar);
 }
 
 Result<BarPlanFile> parse_bar_plan_toml(std::string_view text, const std::filesystem::path& file,
                                         const Bar& bar) {
   const auto parsed = parse_toml_text(text, file);
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   Faults faults(file.string());
   Section root(&parsed->table, "", {1, 1}, faults);
   BarPlanFile out{parsed->source, {}, {}};

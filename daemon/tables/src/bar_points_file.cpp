@@ -10,6 +10,7 @@
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 
 namespace abbe::daemon {
@@ -216,7 +217,7 @@ Result<BarPointsFile> read_bar_points_csv(const std::filesystem::path& file, con
                                           const BarPlanFile& plan,
                                           const calib::MachineNodes& nodes) {
   auto parsed = parse_table(file, {form_of_touches(plan.plan.measurements)});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "touches");
   auto& [source, table, faults] = *parsed;
   TouchRows rows(table, bar, plan, faults);

@@ -10,9 +10,10 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/settings/bounded_toml.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_input.hpp"
+#include "abbe/result/try.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "abbe/settings/section.hpp"
 #include "expansivity.hpp"
 #include "whole_number.hpp"
@@ -97,7 +98,7 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
   auto parsed = parse_table(
       file,
       {{{"position"}, {"kind", true, {"ball", "block"}}, {"index"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "touches");
   auto& [source, table, faults] = *parsed;
   TouchesFile out{source, {}, {}};
@@ -117,7 +118,7 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
 
 Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_errors_csv(*text, file);
 }
 
@@ -125,7 +126,7 @@ Result<BallErrorsFile> parse_errors_csv(std::string_view text, const std::filesy
   auto parsed = parse_table(
       text, file,
       {{{"position"}, {"ball"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"ex_um"}, {"ey_um"}, {"ez_um"}}});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "errors");
   auto& [source, table, faults] = *parsed;
   BallErrorsFile out{source, {}, {}};
@@ -144,14 +145,14 @@ Result<BallErrorsFile> parse_errors_csv(std::string_view text, const std::filesy
 
 Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_calibrator_toml(*text, file);
 }
 
 Result<CalibratorFile> parse_calibrator_toml(std::string_view text,
                                              const std::filesystem::path& file) {
   const auto table = parse_toml(text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   Faults faults(file.string());
   Section root(&*table, "", {1, 1}, faults);
   std::array<std::optional<BlockFace>, 2> faces;

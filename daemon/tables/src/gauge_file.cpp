@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "expansivity.hpp"
 #include "toml_file.hpp"
 
@@ -105,7 +106,7 @@ void read_faces(Section& root, GaugeReadings readings, StepGauge& out) {
 
 Result<GaugeFile> read_gauge(const std::filesystem::path& file, GaugeReadings readings) {
   const auto parsed = parse_toml_file(file);
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   Faults faults(file.string());
   Section root(&parsed->table, "", {1, 1}, faults);
   GaugeFile out{parsed->source, {}};

@@ -11,6 +11,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/geometry/rigid_transform.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -106,7 +107,7 @@ calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t
 
 Result<PathFile> read_path_csv(const std::filesystem::path& file) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_path_csv(*text, file);
 }
 
@@ -117,7 +118,7 @@ Result<PathFile> parse_path_csv(std::string_view text, const std::filesystem::pa
                     {"y_mm"},
                     {"z_mm"},
                     {.name = "feed_mm_per_min", .required = false, .may_be_empty = true}}});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 2, "vertices");
   check_path(*parsed);
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
@@ -141,7 +142,7 @@ Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
        {{"time_s"}, {"tracker_x_mm"}, {"tracker_y_mm"}, {"tracker_z_mm"}, {"status", false}},
        {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
       progress);
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "points");
   check_time_ascends(*parsed);
   check_spherical(*parsed);
@@ -206,7 +207,7 @@ Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vecto
 Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
                                      const ReadProgress& progress) {
   auto parsed = parse_table(file, {{{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}}, progress);
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "readings");
   check_time_ascends(*parsed);
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
@@ -226,7 +227,7 @@ Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
   auto parsed = parse_table(
       file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}},
              {{"x_mm"}, {"y_mm"}, {"z_mm"}, direction("dx"), direction("dy"), direction("dz")}});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
 
@@ -242,7 +243,7 @@ Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
 Result<VerificationFile> read_verification_csv(const std::filesystem::path& file) {
   auto parsed = parse_table(
       file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"tracker_x_mm"}, {"tracker_y_mm"}, {"tracker_z_mm"}}});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   const auto& table = parsed->table;

@@ -10,6 +10,7 @@
 
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "whole_number.hpp"
 
 namespace abbe::daemon {
@@ -146,7 +147,7 @@ Result<MeasuredFile> read_measured_csv(const std::filesystem::path& file) {
                           {.name = "x_mm", .required = false, .may_be_empty = true},
                           {.name = "y_mm", .required = false, .may_be_empty = true},
                           {.name = "z_mm", .required = false, .may_be_empty = true}}});
-  if (!parsed) return tl::make_unexpected(parsed.error());
+  ABBE_TRY(parsed);
   check_rows(*parsed, 1, "values");
   auto& [source, table, faults] = *parsed;
   if (table.has(kLine) != table.has(kLine + 1) || table.has(kLine) != table.has(kLine + 2))

@@ -7,6 +7,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "abbe/settings/section.hpp"
 
@@ -118,9 +119,9 @@ void check_range_offsets(const PartsFile& parts, Section& root) {
 
 Result<PartsFile> read_parts_toml(const std::filesystem::path& file) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   const auto table = parse_toml(*text, file.string());
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   Faults faults(file.string());
   Section root(&*table, "", {1, 1}, faults);
   PartsFile out{{file.filename().string(), sha256_hex(*text)}, {}, {}, {}};

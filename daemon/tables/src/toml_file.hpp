@@ -12,6 +12,7 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/calib/geometry/rigid_transform.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "abbe/settings/section.hpp"
 
@@ -27,7 +28,7 @@ struct TomlFile {
                                                       const std::filesystem::path& file,
                                                       const TomlBounds& bounds = {}) {
   auto table = parse_toml(text, file.string(), bounds);
-  if (!table) return tl::make_unexpected(table.error());
+  ABBE_TRY(table);
   return TomlFile{{file.filename().string(), sha256_hex(text)}, std::move(*table)};
 }
 
@@ -35,7 +36,7 @@ struct TomlFile {
 [[nodiscard]] inline Result<TomlFile> parse_toml_file(const std::filesystem::path& file,
                                                       const TomlBounds& bounds = {}) {
   const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
+  ABBE_TRY(text);
   return parse_toml_text(*text, file, bounds);
 }
 

@@ -8,6 +8,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/calib/geometry/axis_mistakes.hpp"
 #include "abbe/config/calibration_input.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -15,7 +16,7 @@ Result<void> check_travel(const std::filesystem::path& file,
                           std::span<const calib::Vector3> positions_m,
                           std::span<const std::size_t> lines, const MachineConfig& config) {
   const auto machine = otf_machine(config);
-  if (!machine) return tl::unexpected(machine.error());
+  ABBE_TRY(machine);
   const auto& travel = machine->nodes;
   const auto outside = calib::outside_travel(positions_m, travel);
   if (outside.empty()) return {};

@@ -9,6 +9,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/methods/evemu/task_of_files.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
 
 namespace abbe::web {
@@ -33,7 +34,7 @@ SentFile sent_file(const json& body, const char* member) {
 Result<json> otf_task(const json& body) {
   const SentFile file = sent_file(body, "path");
   const auto path = daemon::parse_path_csv(file.text, file.name);
-  if (!path) return tl::unexpected(path.error());
+  ABBE_TRY(path);
   json task{{"method", "otf"}, {"path_m", path->vertices_m}};
   if (body.contains("mode")) task["mode"] = body["mode"];
   return task;
@@ -42,12 +43,12 @@ Result<json> otf_task(const json& body) {
 Result<json> array_task(const json& body) {
   const SentFile file = sent_file(body, "calibrator");
   const auto calibrator = daemon::parse_calibrator_toml(file.text, file.name);
-  if (!calibrator) return tl::unexpected(calibrator.error());
+  ABBE_TRY(calibrator);
   std::optional<daemon::BallErrorsFile> reference;
   if (body.contains("reference")) {
     const SentFile errors = sent_file(body, "reference");
     auto parsed = daemon::parse_errors_csv(errors.text, errors.name);
-    if (!parsed) return tl::unexpected(parsed.error());
+    ABBE_TRY(parsed);
     reference = std::move(*parsed);
   }
 

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::web {
 namespace {
@@ -65,7 +66,7 @@ Result<void> check_certificate(const std::filesystem::path& file,
                                std::chrono::system_clock::time_point when) {
   const auto now = std::chrono::floor<std::chrono::seconds>(when);
   const auto dates = read_certificate(file);
-  if (!dates) return tl::unexpected(dates.error());
+  ABBE_TRY(dates);
   if (now >= dates->until)
     return daemon::fail(ErrorCode::BadInput,
                         fmt::format("certificate {} expired on {}: replace it and restart abbe-web",

@@ -18,6 +18,7 @@
 #include "abbe/report/measured_time.hpp"
 #include "abbe/report/model_figures.hpp"
 #include "abbe/report/model_report.hpp"
+#include "abbe/result/try.hpp"
 #include "lock_within.hpp"
 #include "model_json.hpp"
 
@@ -84,7 +85,7 @@ json event_json(const StoreEvent& event) {
 Result<std::string> id_of(const ModelStore& store, const std::string& name) {
   if (name != "active") return store.find(name);
   auto active = store.active_id();
-  if (!active) return tl::unexpected(active.error());
+  ABBE_TRY(active);
   if (*active) return **active;
   return daemon::fail(daemon::ErrorCode::Refused, "no model is active");
 }
@@ -171,9 +172,9 @@ std::string stamp_of(const ModelStore& store) {
 
 Result<std::string> history_text(const ModelStore& store) {
   const auto entries = store.list();
-  if (!entries) return tl::unexpected(entries.error());
+  ABBE_TRY(entries);
   const auto events = store.history();
-  if (!events) return tl::unexpected(events.error());
+  ABBE_TRY(events);
 
   json out{{"models", json::array()}, {"events", json::array()}};
   for (const StoreEntry& entry : *entries) out["models"].push_back(entry_json(entry));
@@ -197,7 +198,7 @@ std::optional<TrendModel> trend_model(const ModelStore& store, const std::string
 Result<std::vector<TrendModel>> trend_models(const ModelStore& store,
                                              std::map<std::string, TrendModel>& known) {
   auto entries = store.list();
-  if (!entries) return tl::unexpected(entries.error());
+  ABBE_TRY(entries);
   std::erase_if(*entries, [](const StoreEntry& e) { return !e.accepted || !e.fault.empty(); });
   if (entries->size() > kMostTrendModels) entries->resize(kMostTrendModels);
   std::ranges::reverse(*entries);  // in the order of adding, which decides at the same time
@@ -220,7 +221,7 @@ Result<std::vector<TrendModel>> trend_models(const ModelStore& store,
 
 Result<std::string> trend_text(const ModelStore& store, std::map<std::string, TrendModel>& known) {
   const auto found = trend_models(store, known);
-  if (!found) return tl::unexpected(found.error());
+  ABBE_TRY(found);
 
   json models = json::array();
   std::vector<std::pair<std::string, TrendValue>> trend;
@@ -300,11 +301,11 @@ Result<std::string> ModelViews::history() {
 Result<std::string> ModelViews::model(const std::string& name) {
   const ModelStore store{store_};
   const auto id = id_of(store, name);
-  if (!id) return tl::unexpected(id.error());
+  ABBE_TRY(id);
   return kept("model " + *id, stamp_of(store.model_path(*id)) + events_stamp(store), making_model_,
               [&]() -> Result<std::string> {
                 const auto found = subject(*id);
-                if (!found) return tl::unexpected(found.error());
+                ABBE_TRY(found);
                 return text_of(model_json(*found));
               });
 }
@@ -318,10 +319,10 @@ Result<std::string> ModelViews::trend() {
 Result<std::string> ModelViews::report(const std::string& name) {
   const ModelStore store{store_};
   const auto id = id_of(store, name);
-  if (!id) return tl::unexpected(id.error());
+  ABBE_TRY(id);
   return kept("report " + *id, stamp_of(store), making_model_, [&]() -> Result<std::string> {
     const auto found = subject(*id);
-    if (!found) return tl::unexpected(found.error());
+    ABBE_TRY(found);
     return daemon::model_report(*found);
   });
 }
@@ -329,11 +330,11 @@ Result<std::string> ModelViews::report(const std::string& name) {
 Result<std::string> ModelViews::model_file(const std::string& name) {
   const ModelStore store{store_};
   const auto id = id_of(store, name);
-  if (!id) return tl::unexpected(id.error());
+  ABBE_TRY(id);
   return kept("file " + *id, stamp_of(store.model_path(*id)) + events_stamp(store), making_model_,
               [&]() -> Result<std::string> {
                 const auto stored = daemon::stored_model(store, *id);
-                if (!stored) return tl::unexpected(stored.error());
+                ABBE_TRY(stored);
                 return daemon::to_json(stored->document);
               });
 }

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "abbe/result/try.hpp"
 #include "abbe/web/certificate.hpp"
 #include "accept_loop.hpp"
 #include "limited_server.hpp"
@@ -144,7 +145,7 @@ class HttpPageServer final : public PageServer {
     auto workers = WorkerPool::start(
         kThreadsForRequests + web.most_pages,
         [this](const std::string& line) { context_.report.line("internal error", line); });
-    if (!workers) return tl::unexpected(workers.error());
+    ABBE_TRY(workers);
     workers_ = std::move(*workers);
     const auto report = [this](const std::string& subject, const std::string& line) {
       context_.report.line(subject, line);
@@ -301,8 +302,7 @@ bool others_may_read(const std::filesystem::path& key) {
 /// Null without TLS.
 Result<TlsContext> tls_of(const daemon::WebConfig& web) {
   if (!web.tls()) return TlsContext{};
-  if (auto valid = check_certificate(web.certificate, std::chrono::system_clock::now()); !valid)
-    return tl::unexpected(valid.error());
+  ABBE_TRY(check_certificate(web.certificate, std::chrono::system_clock::now()));
   TlsContext tls{SSL_CTX_new(TLS_server_method())};
   if (tls && SSL_CTX_set_min_proto_version(tls.get(), TLS1_2_VERSION) == 1 &&
       SSL_CTX_use_certificate_chain_file(tls.get(), web.certificate.c_str()) == 1 &&
@@ -344,12 +344,12 @@ std::optional<WebSession> session_of(PageContext& context, const httplib::Reques
 
 Result<std::unique_ptr<PageServer>> PageServer::start(PageOptions options) {
   auto tls = tls_of(options.settings.web);
-  if (!tls) return tl::unexpected(tls.error());
+  ABBE_TRY(tls);
   if (const auto& key = options.settings.web.key; others_may_read(key))
     options.report(fmt::format(
         "warning: key {}: other users may read it: chgrp abbe-web, chmod 0640", key.string()));
   auto page = std::make_unique<HttpPageServer>(std::move(options), std::move(*tls));
-  if (auto listening = page->listen(); !listening) return tl::unexpected(listening.error());
+  ABBE_TRY(page->listen());
   return page;
 }
 

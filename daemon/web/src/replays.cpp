@@ -20,6 +20,7 @@
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/file_descriptor.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/web/recording_list.hpp"
 
 namespace abbe::web {
@@ -117,15 +118,14 @@ Replays::~Replays() {
 }
 
 Result<void> Replays::begin(const std::string& name) {
-  if (const auto exists = open_recording(folder_, name); !exists)
-    return tl::unexpected(exists.error());
+  ABBE_TRY(open_recording(folder_, name));
   const std::lock_guard lock(mutex_);
   if (child_ != 0)
     return daemon::fail(ErrorCode::Refused, "another recording is being replayed: wait for it");
   if (thread_.joinable()) thread_.join();
 
   auto child = start_child({program_.string(), "replay", (folder_ / name).string(), "--json"});
-  if (!child) return tl::unexpected(child.error());
+  ABBE_TRY(child);
   const pid_t pid = child->pid;
   try {
     thread_ =

@@ -7,6 +7,8 @@
 #include <array>
 #include <stdexcept>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::web {
 namespace {
 
@@ -50,15 +52,15 @@ Result<WebSession> Sessions::log_in(const std::string& user, const std::string& 
   if (!possible())
     return daemon::fail(ErrorCode::Refused, "nobody can log in: [web] users names no file");
   const auto before = failures_of(address, now);
-  if (!before) return tl::unexpected(before.error());
+  ABBE_TRY(before);
   const auto turn = turns_.wait(address, *before, kPatience);
   if (!turn)
     return daemon::fail(ErrorCode::Io,
                         "many passwords are being checked: try again in some seconds");
   // Others of this address may have failed while this one waited.
-  if (const auto may = failures_of(address, now); !may) return tl::unexpected(may.error());
+  ABBE_TRY(failures_of(address, now));
   const auto users = users_->users();
-  if (!users) return tl::unexpected(users.error());
+  ABBE_TRY(users);
   const auto found = find_web_user(**users, user, password);
 
   const std::lock_guard lock(mutex_);

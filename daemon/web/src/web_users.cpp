@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "abbe/base/text_file.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::web {
 namespace {
@@ -94,9 +95,9 @@ std::optional<WebRole> web_role_named(std::string_view name) noexcept {
 }
 
 Result<std::vector<WebUser>> read_web_users(const std::filesystem::path& file) {
-  if (auto mode = check_mode(file); !mode) return tl::unexpected(mode.error());
+  ABBE_TRY(check_mode(file));
   const auto text = daemon::read_regular_file(file);
-  if (!text) return tl::unexpected(text.error());
+  ABBE_TRY(text);
 
   std::vector<WebUser> users;
   std::vector<std::string> faults;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "abbe/protocol/can/error_frame.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::drivers {
 
@@ -26,7 +27,7 @@ std::string every(const std::optional<std::chrono::nanoseconds>& period) {
 Result<std::unique_ptr<EncoderDevice>> EncoderDevice::create(const EncoderDeviceOptions& options,
                                                              std::unique_ptr<CanBus> bus,
                                                              const TimeSource& time) {
-  if (auto ok = check(options.receiver); !ok) return tl::unexpected(ok.error());
+  ABBE_TRY(check(options.receiver));
   if (options.sync == SyncSource::Kernel && !bus->has_sync()) {
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration,

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::drivers {
 
@@ -43,7 +44,7 @@ Result<void> check(const EncoderReceiverOptions& options) {
   if (options.u_sampling_delay.count() < 0)
     return refuse("encoder bus: the uncertainty of the sampling delay must not be negative");
   for (std::size_t i = 0; i < options.axes.size(); ++i) {
-    if (auto ok = check_axis(options.axes[i]); !ok) return ok;
+    ABBE_TRY(check_axis(options.axes[i]));
     for (std::size_t j = 0; j < i; ++j) {
       if (options.axes[i].node != options.axes[j].node) continue;
       return refuse(fmt::format("encoder axes {} and {}: both are node {}", options.axes[j].name,

@@ -15,6 +15,7 @@
 #include "abbe/drivers/can/linux_frame.hpp"
 #include "abbe/protocol/can/canopen.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
+#include "abbe/result/try.hpp"
 #include "can/socket_io.hpp"
 
 namespace abbe::drivers {
@@ -242,7 +243,7 @@ Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
     return error;
   };
   const auto index = find_interface();
-  if (!index) return tl::unexpected(index.error());
+  ABBE_TRY(index);
   sync_fd_ = socket(PF_CAN, SOCK_DGRAM | SOCK_CLOEXEC, CAN_BCM);
   if (sync_fd_ < 0) return no("socket of the broadcast manager");
   sockaddr_can address{};

@@ -7,6 +7,7 @@
 
 #include <memory>
 
+#include "abbe/result/try.hpp"
 #include "can/socket_io.hpp"
 
 namespace abbe::drivers {
@@ -79,9 +80,9 @@ Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
   }
 
   const auto local = resolve(options_.local_address, options_.local_port);
-  if (!local) return tl::unexpected(local.error());
+  ABBE_TRY(local);
   const auto peer = resolve(options_.peer_address, options_.peer_port);
-  if (!peer) return tl::unexpected(peer.error());
+  ABBE_TRY(peer);
   stamps_.nothing_older_than(read_clock_pair());
 
   return bind_and_connect(*local, *peer);
@@ -245,7 +246,7 @@ Result<void> UdpCanBus::send(std::span<const can::CanFrame> frames) {
     can::DatagramWriter writer{buffer, sequence_++};
     std::size_t n = 0;
     while (n < frames.size() && writer.add(frames[n])) ++n;
-    if (auto sent = send_datagram(writer.finish()); !sent) return sent;
+    ABBE_TRY(send_datagram(writer.finish()));
     frames = frames.subspan(n);
   }
   return {};

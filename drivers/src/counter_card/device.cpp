@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "abbe/protocol/usbip/urb.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -33,7 +34,7 @@ Result<void> check(const CounterCardOptions& options) {
     return tl::unexpected{
         Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.name, what)}};
   };
-  if (auto ok = check(options.receiver.wiring); !ok) return ok;
+  ABBE_TRY(check(options.receiver.wiring));
   if (options.transfer_time.count() <= 0)
     return refuse("the duration of a transfer must be positive");
   if (options.transfers_in_flight < 2) return refuse("at least 2 transfers must be in flight");

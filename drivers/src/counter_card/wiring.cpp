@@ -8,6 +8,7 @@
 #include <set>
 
 #include "abbe/protocol/samples.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -40,7 +41,7 @@ Result<void> check_axes(const CounterCardWiring& wiring) {
   }
   std::set<std::string> names;
   for (const auto& axis : wiring.axes) {
-    if (auto ok = check_axis(axis); !ok) return ok;
+    ABBE_TRY(check_axis(axis));
     if (!names.insert(axis.name).second)
       return refuse_wiring(fmt::format("two channels claim axis {}", axis.name));
   }
@@ -60,13 +61,10 @@ Result<void> check_channels(const CounterCardWiring& wiring) {
     return {};
   };
 
-  for (const auto& axis : wiring.axes)
-    if (auto ok = claim(axis.channel, "axis " + axis.name); !ok) return ok;
-  if (auto ok = claim(wiring.clock_channel, "the clock"); !ok) return ok;
-  if (wiring.latch_channel)
-    if (auto ok = claim(*wiring.latch_channel, "the probe latch"); !ok) return ok;
-  if (wiring.edge_channel)
-    if (auto ok = claim(*wiring.edge_channel, "the probe edges"); !ok) return ok;
+  for (const auto& axis : wiring.axes) ABBE_TRY(claim(axis.channel, "axis " + axis.name));
+  ABBE_TRY(claim(wiring.clock_channel, "the clock"));
+  if (wiring.latch_channel) ABBE_TRY(claim(*wiring.latch_channel, "the probe latch"));
+  if (wiring.edge_channel) ABBE_TRY(claim(*wiring.edge_channel, "the probe edges"));
 
   return {};
 }
@@ -100,8 +98,8 @@ Result<void> check_clock(const CounterCardWiring& wiring) {
 }  // namespace
 
 Result<void> check(const CounterCardWiring& wiring) {
-  if (auto ok = check_axes(wiring); !ok) return ok;
-  if (auto ok = check_channels(wiring); !ok) return ok;
+  ABBE_TRY(check_axes(wiring));
+  ABBE_TRY(check_channels(wiring));
   return check_clock(wiring);
 }
 

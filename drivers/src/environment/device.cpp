@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::drivers {
 
 using protocol::HostTime;
@@ -37,7 +39,7 @@ Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(
 
 Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(
     const EnvironmentDeviceOptions& options, const TimeSource& time, EnvironmentLink& link) {
-  if (const auto valid = check(options.map); !valid) return tl::unexpected(valid.error());
+  ABBE_TRY(check(options.map));
   if (!has_address(options.address))
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration, options.name + ": host, port or path is missing"});

@@ -6,6 +6,8 @@
 #include <array>
 #include <thread>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::drivers {
 
 using protocol::HostTime;
@@ -32,7 +34,7 @@ Result<std::unique_ptr<EnvironmentLine>> EnvironmentLine::create(
                 fmt::format("{} {} and {} {} are not on the same line", options.front().name,
                             text_of(address), o.name, text_of(o.address))});
     auto device = EnvironmentDevice::create(o, time, line->link_);
-    if (!device) return tl::unexpected(device.error());
+    ABBE_TRY(device);
     line->devices_.push_back(std::move(*device));
   }
 

@@ -13,6 +13,8 @@
 #include <ctime>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::drivers {
 namespace {
 
@@ -66,8 +68,7 @@ ModbusLine::~ModbusLine() = default;
 
 Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
   decltype(lock_) lock;
-  if (const auto* serial = std::get_if<ModbusSerial>(&address))
-    if (auto locked = lock.take(serial->path); !locked) return locked;
+  if (const auto* serial = std::get_if<ModbusSerial>(&address)) ABBE_TRY(lock.take(serial->path));
   std::string tcp_address;
   if (const auto* tcp = std::get_if<ModbusTcp>(&address)) {
     if (!host_) host_.emplace(tcp->host, tcp->port);

@@ -5,6 +5,8 @@
 #include <array>
 #include <utility>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::drivers::ipp_text {
 namespace {
 
@@ -59,16 +61,16 @@ std::string_view method_name(std::string_view method) {
 
 Result<std::string> go_to(const ProbePoint& p) {
   const auto place = place_of(p);
-  if (!place) return tl::unexpected(place.error());
+  ABBE_TRY(place);
   const auto& [x, y, z] = *place;
   return fmt::format("GoTo(X({}),Y({}),Z({}))", x, y, z);
 }
 
 Result<std::string> pt_meas(const ProbePoint& p) {
   const auto place = place_of(p);
-  if (!place) return tl::unexpected(place.error());
+  ABBE_TRY(place);
   const auto normal = texts_of(p.normal, 1.0, {"I", "J", "K"}, "");
-  if (!normal) return tl::unexpected(normal.error());
+  ABBE_TRY(normal);
   const auto& [x, y, z] = *place;
   const auto& [i, j, k] = *normal;
   return fmt::format("PtMeas(X({}),Y({}),Z({}),IJK({},{},{}))", x, y, z, i, j, k);

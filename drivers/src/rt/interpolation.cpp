@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::drivers {
 namespace {
 
@@ -103,7 +105,7 @@ tl::expected<AxesAt, InterpolationError> interpolate_axes(
     std::span<const AxisSample> samples, protocol::HostTime time, std::chrono::nanoseconds u_time,
     const InterpolationOptions& options) noexcept {
   const auto around = find_around(samples, time, options.max_span);
-  if (!around) return tl::unexpected(around.error());
+  ABBE_TRY(around);
   AxesAt at;
   at.time = time;
   at.axis_count = std::min(around->before->axis_count, around->after->axis_count);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <span>
 
+#include "abbe/result/try.hpp"
+
 namespace abbe::drivers {
 
 using protocol::AxisSample;
@@ -62,7 +64,7 @@ tl::expected<ScanHistory::At, InterpolationError> ScanHistory::at(
   }
   const auto axes = interpolate_axes(std::span{around}.first(count), HostTime{t.time_since_epoch()},
                                      nanoseconds{}, options);
-  if (!axes) return tl::unexpected(axes.error());
+  ABBE_TRY(axes);
   const CounterScan& before = scan(after - 1);
   return At{*axes, before.axes.head.time + (t - instant(before.clock_count)),
             before.axes.head.u_time};

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "abbe/result/try.hpp"
 #include "ippdme/scanner.hpp"
 
 namespace abbe::protocol::ippdme {
@@ -52,7 +53,7 @@ tl::expected<Argument, LineError> property(Scanner& scan, std::string_view name)
   do {
     if (a.count == Argument::kMostNumbers) return tl::unexpected(LineError::BadArgument);
     const auto number = scan.number();
-    if (!number) return tl::unexpected(number.error());
+    ABBE_TRY(number);
     a.numbers[a.count++] = *number;
   } while (scan.separator(','));
   if (!scan.separator(')')) return tl::unexpected(LineError::BadArgument);
@@ -126,7 +127,7 @@ tl::expected<Response, LineError> parse_response(std::string_view line) ABBE_RT 
     case '!': {
       scan.spaces();
       const auto error = error_report(scan);
-      if (!error) return tl::unexpected(error.error());
+      ABBE_TRY(error);
       response.kind = Response::Kind::Error;
       response.error = *error;
       return response;

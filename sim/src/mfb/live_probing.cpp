@@ -1,5 +1,6 @@
 #include "abbe/sim/mfb/live_probing.hpp"
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/noise.hpp"
 #include "crossing.hpp"
 
@@ -72,7 +73,7 @@ Result<LiveProgram> live_program(const ProbedBar& probed, const LiveProbing& opt
   Programmer programmer(options);
   for (const Touch& touch : probed.touches) programmer.touch(touch);
   const auto motion = PathMotion::plan(programmer.path());
-  if (!motion) return tl::unexpected(motion.error());
+  ABBE_TRY(motion);
 
   LiveProgram program{programmer.path(), {}};
   const std::vector<Approach>& approaches = programmer.approaches();

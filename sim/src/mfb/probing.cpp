@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/mfb/clamped_bar.hpp"
 #include "abbe/sim/touching.hpp"
 #include "mfb/numbers.hpp"
@@ -167,7 +168,7 @@ Result<ProbedBar> probe_bar(const TruthMachine& machine, const TrueBar& bar,
         fmt::format("tip radius {} mm: must be below 0.8 of the radius of a hole, {} mm",
                     1e3 * options.probe.tip_radius_m, 1e3 * bar.pattern.hole_radius_m));
   }
-  if (auto known = check_names(bar, plan, options); !known) return tl::unexpected(known.error());
+  ABBE_TRY(check_names(bar, plan, options));
 
   ProbedBar probed;
   for (std::size_t m = 0; m < plan.size(); ++m) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/noise.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "abbe/sim/touching.hpp"
@@ -171,7 +172,7 @@ Result<ReversalRun> run_reversal(const TruthMachine& machine, const TrueBar& bar
   ReversalRun run;
   run.plan = reversal_plan(machine, options);
   auto probed = probe_bar(machine, bar, run.plan, options.probing);
-  if (!probed) return tl::unexpected(probed.error());
+  ABBE_TRY(probed);
   run.probed = *std::move(probed);
   run.plan = as_planned(std::move(run.plan), options);
   measure_gauge(machine, bar.pattern.length_m(), options, run);

@@ -17,6 +17,7 @@
 #include "abbe/calib/internal/model/certainty.hpp"
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/slow_noise.hpp"
 
 namespace abbe::calib::evemu {
@@ -252,16 +253,12 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
   }
 
   const Result<ScaledDesign> design = design_of(o);
-  if (!design) {
-    return tl::unexpected(design.error());
-  }
+  ABBE_TRY(design);
 
   const bool with_active = active != nullptr && active->holds_for_tool(o.machine.tool_offset_m);
   Remainder none, candidate, other, candidate_beside;
   for (const PositionRows& p : positions) {
-    if (Result<void> goes_on = check_stopped(watch.stopped); !goes_on) {
-      return tl::unexpected(goes_on.error());
-    }
+    ABBE_TRY(check_stopped(watch.stopped));
     const Observations rest = part_of(o, p.position, true),
                        left_out = part_of(o, p.position, false);
     const Result<Fit> fit = fit_with(problem_of(rest, *design, options), options);
@@ -315,9 +312,7 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
   const Result<std::vector<Alternative>> others =
       alternatives(o, solution, part_of(options.watch, 0.0, 0.5));
 
-  if (!others) {
-    return tl::unexpected(others.error());
-  }
+  ABBE_TRY(others);
 
   const Watch second_half = part_of(options.watch, 0.5, 1.0);
   return held_out(o, solution.statistics.s_m, active, solve, second_half)

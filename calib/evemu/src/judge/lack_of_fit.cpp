@@ -25,6 +25,7 @@
 #include "abbe/calib/internal/evemu/solve/fit_coefficients.hpp"
 #include "abbe/calib/internal/geometry/rigid_free_norm.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 #include "judge/alternative_columns.hpp"
 #include "solve/norm_over_balls.hpp"
 #include "solve/refit.hpp"
@@ -97,9 +98,7 @@ Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, c
                           std::span<const Added> family) {
   Screened most;
   for (const Added& added : family) {
-    if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
-      return tl::unexpected(goes_on.error());
-    }
+    ABBE_TRY(check_stopped(all.watch.stopped));
     const Screen::Gain gain = screen.gain(white_rows(all.rows.o, columns.of(added)));
     if (!std::isfinite(gain.log_likelihood)) {
       all.add(
@@ -119,9 +118,7 @@ Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, c
 Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, const Screen& screen,
                           std::span<const Added> family) {
   const Result<Screened> best = screened(all, columns, screen, family);
-  if (!best) {
-    return tl::unexpected(best.error());
-  }
+  ABBE_TRY(best);
 
   if (best->best == nullptr) {
     return {};
@@ -434,9 +431,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations,
   // fit an array that moved once.
   const Observations o = with_slow_noise(observations, 0.0);
   const Result<ScaledDesign> design = design_of(o);
-  if (!design) {
-    return tl::unexpected(design.error());
-  }
+  ABBE_TRY(design);
 
   const auto rows = run_rows(o, *design, solution);
   const auto base = rows.and_then([](const RunRows& r) { return base_refit(r); });
@@ -450,9 +445,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations,
   const Result<void> compared =
       compare_touches(all, touches).and_then([&] { return compare_all(all, solution); });
 
-  if (!compared) {
-    return tl::unexpected(compared.error());
-  }
+  ABBE_TRY(compared);
 
   if (auto scatter = scatter_of_touches(correction_size(observations, solution), touches)) {
     all.add(*std::move(scatter));

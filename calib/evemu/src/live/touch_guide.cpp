@@ -8,6 +8,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "live/touch_site.hpp"
 
 namespace abbe::calib::evemu {
@@ -61,9 +62,8 @@ TouchGuide& TouchGuide::operator=(TouchGuide&&) noexcept = default;
 TouchGuide::~TouchGuide() = default;
 
 Result<TouchGuide> TouchGuide::create(Calibrator calibrator, TouchPlan plan, GuideOptions options) {
-  if (Result<void> sound = check(calibrator); !sound) return tl::unexpected(sound.error());
-  if (Result<void> sound = check_plan(plan, options.observe); !sound)
-    return tl::unexpected(sound.error());
+  ABBE_TRY(check(calibrator));
+  ABBE_TRY(check_plan(plan, options.observe));
   return TouchGuide(
       std::make_unique<const Setup>(Setup{std::move(calibrator), std::move(plan), options}));
 }

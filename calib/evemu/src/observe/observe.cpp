@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/fit/point_set.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/errors_shape.hpp"
 #include "observe/touched_position.hpp"
 
@@ -67,9 +68,7 @@ Result<void> check_volume(const Observations& o, const ObserveOptions& options) 
   }
 
   const Result<fit::PointSet> set = fit::point_set(readings, 4, "ball array");
-  if (!set) {
-    return tl::unexpected(set.error());
-  }
+  ABBE_TRY(set);
 
   const double thickness = set->singular_values(2) / set->singular_values(0);
   if (!(thickness >= options.least_thickness)) {
@@ -115,12 +114,8 @@ Result<void> place_ball1(Observations& o, const ObserveOptions& options) {
 }
 
 Result<Observations> finish(Observations o, const ObserveOptions& options) {
-  if (Result<void> placed = place_ball1(o, options); !placed) {
-    return tl::unexpected(placed.error());
-  }
-  if (Result<void> volume = check_volume(o, options); !volume) {
-    return tl::unexpected(volume.error());
-  }
+  ABBE_TRY(place_ball1(o, options));
+  ABBE_TRY(check_volume(o, options));
   return o;
 }
 
@@ -147,9 +142,7 @@ std::optional<std::size_t> same_orientation_as(const Matrix3& R_self_uni,
 
 Result<TouchedArtefact> see_artefact(int position, std::span<const Touch> touches,
                                      const Calibrator& at_20_C, const ObserveOptions& options) {
-  if (Result<void> sound = check(at_20_C); !sound) {
-    return tl::unexpected(sound.error());
-  }
+  ABBE_TRY(check(at_20_C));
   const Calibrator c = at_the_machine(at_20_C, expansion_of(at_20_C, options));
   Touched touched;
   for (std::size_t i = 0; i < touches.size(); ++i) {
@@ -160,21 +153,15 @@ Result<TouchedArtefact> see_artefact(int position, std::span<const Touch> touche
 
 Result<Observations> observe(std::span<const Touch> touches, const Calibrator& at_20_C,
                              const Machine& machine, const ObserveOptions& options) {
-  if (Result<void> sound = check(at_20_C); !sound) {
-    return tl::unexpected(sound.error());
-  }
+  ABBE_TRY(check(at_20_C));
 
-  if (Result<void> known = check_temperature(at_20_C, options); !known) {
-    return tl::unexpected(known.error());
-  }
+  ABBE_TRY(check_temperature(at_20_C, options));
 
   const std::optional<Expansion> expansion = expansion_of(at_20_C, options);
   const Calibrator c = at_the_machine(at_20_C, expansion);
   const Result<std::map<int, Touched>> positions = by_position(touches, options);
 
-  if (!positions) {
-    return tl::unexpected(positions.error());
-  }
+  ABBE_TRY(positions);
 
   Observations o;
   o.machine = machine;
@@ -184,9 +171,7 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
 
   for (const auto& [position, touched] : *positions) {
     Result<TouchedArtefact> seen = see(position, touched, c, pre_to_uniform(c), options);
-    if (!seen) {
-      return tl::unexpected(seen.error());
-    }
+    ABBE_TRY(seen);
     for (std::size_t i = 0; i < c.balls.size(); ++i) {
       const Vector3& reading_m = seen->balls[i].centre;
       // Errors are relative to Ball1: the error of Ball1 is set to exactly zero, without rounding.
@@ -250,9 +235,7 @@ Result<Observations> observe_errors(std::span<const BallError> errors, const Mac
     }
   }
 
-  if (Result<void> one = check_one_shape(o); !one) {
-    return tl::unexpected(one.error());
-  }
+  ABBE_TRY(check_one_shape(o));
 
   return finish(std::move(o), options);
 }

@@ -9,6 +9,7 @@
 
 #include "abbe/calib/geometry/axis_mistakes.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/touch_checks.hpp"
 #include "run/angle.hpp"
 
@@ -355,25 +356,17 @@ Result<std::map<int, Touched>> by_position(std::span<const Touch> touches,
 
 Result<TouchedArtefact> see(int position, const Touched& touched, const Calibrator& c,
                             const RigidTransform& T_uni_pre, const ObserveOptions& options) {
-  if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
-    return tl::unexpected(complete.error());
-  }
+  ABBE_TRY(check_complete(position, touched, c, options));
 
   TouchedArtefact seen;
   seen.position = position;
   Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
 
-  if (!balls) {
-    return tl::unexpected(balls.error());
-  }
+  ABBE_TRY(balls);
 
-  if (Result<void> unit = check_unit(position, touched, *balls, c, options); !unit) {
-    return tl::unexpected(unit.error());
-  }
+  ABBE_TRY(check_unit(position, touched, *balls, c, options));
 
-  if (Result<void> single = check_single_touches(position, touched, options); !single) {
-    return tl::unexpected(single.error());
-  }
+  ABBE_TRY(check_single_touches(position, touched, options));
 
   seen.balls = *std::move(balls);
   for (const Calibrator::Ball& ball : c.balls) {
@@ -382,22 +375,14 @@ Result<TouchedArtefact> see(int position, const Touched& touched, const Calibrat
     seen.ball_index.push_back(points.mean_index());
   }
 
-  if (Result<void> twice = check_twice(position, seen.balls); !twice) {
-    return tl::unexpected(twice.error());
-  }
+  ABBE_TRY(check_twice(position, seen.balls));
 
-  if (Result<void> radii = check_radii(position, touched, seen.balls, c, options); !radii) {
-    return tl::unexpected(radii.error());
-  }
+  ABBE_TRY(check_radii(position, touched, seen.balls, c, options));
 
   const Result<RigidTransform> pose = rough_pose(position, seen.balls, c, options);
-  if (!pose) {
-    return tl::unexpected(pose.error());
-  }
+  ABBE_TRY(pose);
 
-  if (Result<void> blocks = fit_blocks(seen, touched, c, *pose, options); !blocks) {
-    return tl::unexpected(blocks.error());
-  }
+  ABBE_TRY(fit_blocks(seen, touched, c, *pose, options));
 
   Result<RigidTransform> frame =
       uniform_frame(seen.balls.front().centre, seen.blocks[0].normal, seen.blocks[1].normal);

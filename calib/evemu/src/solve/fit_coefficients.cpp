@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/estimation/dense_information.hpp"
 #include "abbe/calib/internal/evemu/solve/artefact_rows.hpp"
 #include "abbe/calib/internal/evemu/solve/design_rows.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/norm_over_balls.hpp"
 
 namespace abbe::calib::evemu {
@@ -113,9 +114,7 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   const LinearGaussian gaussian = gaussian_of(problem);
   const Result<HyperParameters> hyper = most_likely(kind, problem.design, positions, gaussian);
 
-  if (!hyper) {
-    return tl::unexpected(hyper.error());
-  }
+  ABBE_TRY(hyper);
 
   Fit fit;
   fit.hyper = *hyper;

@@ -7,6 +7,7 @@
 #include "abbe/calib/internal/sparse/cross_validation.hpp"
 #include "abbe/calib/internal/sparse/optimality.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -72,9 +73,7 @@ sparse::PathOptions path_along(std::vector<double> lambda) {
 Result<SparseChoice> choose(const Regression& r, const FitProblem& problem,
                             const SolveOptions& options) {
   const Result<sparse::Folds> folds = folds_of(problem.observations, options.sparse);
-  if (!folds) {
-    return tl::unexpected(folds.error());
-  }
+  ABBE_TRY(folds);
 
   const auto path = path_along(options.sparse.lambda.empty() ? sparse::log_spaced(1e-1, 1e-10, 100)
                                                              : options.sparse.lambda);
@@ -158,9 +157,7 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
       scatter += problem.A * draw(problem.A.cols());  // one array for all positions of a run
     }
     const auto refit = path_to({r.X, fitted_mm + kMmPerM * scatter}, options, choice);
-    if (!refit) {
-      return tl::unexpected(refit.error());
-    }
+    ABBE_TRY(refit);
     c.col(run) = scaled_from_named(problem.design, at_end(*refit));
   }
 
@@ -178,17 +175,13 @@ Result<void> add_covariance(const FitProblem& problem, const Regression& r,
   const Result<Fit> noise =
       fit_prior(PriorKind::BayesPose, problem_of(problem.observations, problem.design, bayes));
 
-  if (!noise) {
-    return tl::unexpected(noise.error());
-  }
+  ABBE_TRY(noise);
 
   const Eigen::VectorXd fitted_mm = (r.X * beta.tail(beta.size() - 1)).array() + beta(0);
   Result<Eigen::MatrixXd> covariance =
       bootstrap(problem, r, fitted_mm, options, *fit.sparse, *noise->hyper);
 
-  if (!covariance) {
-    return tl::unexpected(covariance.error());
-  }
+  ABBE_TRY(covariance);
 
   fit.covariance_m2 = *std::move(covariance);
   fit.s_m = noise->s_m;
@@ -204,19 +197,13 @@ Result<Fit> fit_sparse(const FitProblem& problem, const SolveOptions& options) {
   Result<SparseChoice> choice = options.sparse.chosen ? Result<SparseChoice>(*options.sparse.chosen)
                                                       : choose(r, problem, options);
 
-  if (!choice) {
-    return tl::unexpected(choice.error());
-  }
+  ABBE_TRY(choice);
 
   const Result<sparse::Path> path = path_to(r, options, *choice);
-  if (!path) {
-    return tl::unexpected(path.error());
-  }
+  ABBE_TRY(path);
 
   const Result<sparse::Convexity> convexity = sparse::convexity(r.X, *path);
-  if (!convexity) {
-    return tl::unexpected(convexity.error());
-  }
+  ABBE_TRY(convexity);
 
   choice->curvature = convexity->smallest_eigenvalue(path->reached() - 1);
   const Eigen::VectorXd beta = at_end(*path);
@@ -230,9 +217,7 @@ Result<Fit> fit_sparse(const FitProblem& problem, const SolveOptions& options) {
   fit.iterations = static_cast<int>(path->reached());
 
   if (options.sparse.bootstrap_runs > 1) {
-    if (Result<void> added = add_covariance(problem, r, beta, options, fit); !added) {
-      return tl::unexpected(added.error());
-    }
+    ABBE_TRY(add_covariance(problem, r, beta, options, fit));
   }
 
   return fit;

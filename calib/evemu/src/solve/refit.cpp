@@ -8,6 +8,7 @@
 #include "abbe/calib/evemu/solve/noise.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/evemu/solve/fit_coefficients.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/most_likely_near.hpp"
 #include "solve/norm_over_balls.hpp"
 
@@ -33,9 +34,7 @@ Result<RunRows> run_rows(const Observations& o, const ScaledDesign& design,
 
   const auto hyper = most_likely(PriorKind::BayesPose, design, rows.positions,
                                  LinearGaussian(rows.X, rows.S, rows.y));
-  if (!hyper) {
-    return tl::unexpected(hyper.error());
-  }
+  ABBE_TRY(hyper);
 
   rows.hyper = *hyper;
   return rows;
@@ -50,9 +49,7 @@ Result<Refit> refit_to(const Eigen::VectorXd& y, const RunRows& rows, const Scal
   const LinearGaussian gaussian(all, rows.S, y);
   const auto hyper = most_likely_near(rows.hyper, design, rows.positions, gaussian, added);
 
-  if (!hyper) {
-    return tl::unexpected(hyper.error());
-  }
+  ABBE_TRY(hyper);
 
   const Eigen::VectorXd prior = with_added(
       prior_variances(PriorKind::BayesPose, design, rows.positions, *hyper), design.size(), added);

@@ -9,6 +9,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/statistics/quantile_999.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -143,9 +144,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
 
   const PolynomialModel& evemu = *solution.model.polynomials();
   const Used used = inside_of(solution.model.validity(), reference.points);
-  if (Result<void> valid = check_size(used, reference.points.size()); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_size(used, reference.points.size()));
 
   const ReferenceRows rows = rows_of(evemu, used.points);
   if (!rows.r.allFinite()) {
@@ -193,9 +192,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   Result<PolynomialModel> turned =
       PolynomialModel::of(evemu.design(), evemu.ball1_m(), evemu.c_m() + G * turn.omega_rad, C);
 
-  if (!turned) {
-    return tl::unexpected(turned.error());
-  }
+  ABBE_TRY(turned);
 
   return VolumetricModel::from_polynomials(*std::move(turned), Gauge::Ball1,
                                            solution.model.tool_offsets_m().front(),

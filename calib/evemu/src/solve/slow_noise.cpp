@@ -6,6 +6,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/evemu/solve/fit_coefficients.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/most_likely_near.hpp"
 
 namespace abbe::calib::evemu {
@@ -48,9 +49,7 @@ Result<SlowNoise> likely_slow_noise(const Observations& o, const ScaledDesign& d
                                     const HyperParameters& start) {
   const FitProblem problem = problem_of(o, design, {});
   const Result<double> without = log_likelihood_with(0.0, problem, start);
-  if (!without) {
-    return tl::unexpected(without.error());
-  }
+  ABBE_TRY(without);
 
   SlowNoise best;
   const auto consider = [&](double per_s) -> Result<void> {
@@ -62,9 +61,7 @@ Result<SlowNoise> likely_slow_noise(const Observations& o, const ScaledDesign& d
   };
 
   for (const double per_s : {0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0}) {
-    if (const Result<void> compared = consider(per_s); !compared) {
-      return tl::unexpected(compared.error());
-    }
+    ABBE_TRY(consider(per_s));
   }
 
   if (best.per_s == 0.0) {
@@ -73,9 +70,7 @@ Result<SlowNoise> likely_slow_noise(const Observations& o, const ScaledDesign& d
 
   const double coarse = best.per_s;
   for (const double factor : {std::sqrt(0.5), std::sqrt(2.0)}) {
-    if (const Result<void> compared = consider(coarse * factor); !compared) {
-      return tl::unexpected(compared.error());
-    }
+    ABBE_TRY(consider(coarse * factor));
   }
 
   return best;

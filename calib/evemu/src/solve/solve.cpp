@@ -13,6 +13,7 @@
 #include "abbe/calib/internal/evemu/solve/design_rows.hpp"
 #include "abbe/calib/internal/evemu/solve/fit_coefficients.hpp"
 #include "abbe/calib/internal/geometry/constant_fields.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/find_misfit.hpp"
 #include "solve/slow_noise.hpp"
 
@@ -88,9 +89,7 @@ Result<MeanRotation> set_datum(const FitProblem& problem, Fit& fit) {
   }
 
   const Result<Eigen::MatrixXd> S = to_datum(problem, mean);
-  if (!S) {
-    return tl::unexpected(S.error());
-  }
+  ABBE_TRY(S);
 
   fit.c_m = *S * fit.c_m;
   fit.covariance_m2 = *S * fit.covariance_m2 * S->transpose();
@@ -237,9 +236,7 @@ Result<ScaledDesign> design_of(const Observations& o) {
 }
 
 Result<Solution> solve(const Observations& o, const SolveOptions& options) {
-  if (Result<void> valid = check(options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(options));
 
   constexpr std::size_t kLeastPositions = 2;
   if (o.positions() < kLeastPositions) {
@@ -248,21 +245,15 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   }
 
   Result<ScaledDesign> design = design_of(o);
-  if (!design) {
-    return tl::unexpected(design.error());
-  }
+  ABBE_TRY(design);
 
   const FitProblem problem = problem_of(o, *design, options);
   Result<Fit> fit = fit_with(problem, options);
-  if (!fit) {
-    return tl::unexpected(fit.error());
-  }
+  ABBE_TRY(fit);
 
   if (options.estimator == Estimator::BayesPose && problem.from_touches && o.slow_noise == 0.0) {
     const Result<SlowNoise> slow = likely_slow_noise(o, *design, *fit->hyper);
-    if (!slow) {
-      return tl::unexpected(slow.error());
-    }
+    ABBE_TRY(slow);
     if (slow->log_likelihood > kLeastSlowNoiseGain) {
       return solve(with_slow_noise(o, slow->per_s), options);
     }
@@ -276,21 +267,15 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
 
   const Eigen::VectorXd raw_c_m = fit->c_m;
   const Result<MeanRotation> rotation = set_datum(problem, *fit);
-  if (!rotation) {
-    return tl::unexpected(rotation.error());
-  }
+  ABBE_TRY(rotation);
 
   Result<ValidityVolume> validity = ValidityVolume::hull_of(readings_m(o));
 
-  if (!validity) {
-    return tl::unexpected(validity.error());
-  }
+  ABBE_TRY(validity);
 
   Result<PolynomialModel> evemu =
       PolynomialModel::of(*design, o.ball1_m, fit->c_m, fit->covariance_m2);
-  if (!evemu) {
-    return tl::unexpected(evemu.error());
-  }
+  ABBE_TRY(evemu);
 
   return VolumetricModel::from_polynomials(*std::move(evemu),
                                            rotation->referenced ? Gauge::Ball1 : Gauge::Ball1Blocks,

@@ -12,6 +12,7 @@
 #include "abbe/calib/internal/mfb/identify/reversal.hpp"
 #include "abbe/calib/internal/statistics/student_tail.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 #include "identify/gauge_line.hpp"
 #include "solve/outlying_features.hpp"
 
@@ -24,9 +25,7 @@ constexpr double kBeside_m = 1e-3;  // a gauge farther from the bar is beside it
 Result<MfbMachine> machine_without_limits() {
   constexpr double kFar_m = 100.0;
   Result<KinematicChain> chain = KinematicChain::parse("[w b X Y Z t]");
-  if (!chain) {
-    return tl::unexpected(chain.error());
-  }
+  ABBE_TRY(chain);
   MfbMachine machine{*chain, {}};
   for (auto& axis : machine.nodes) {
     axis.nodes_m = {-kFar_m, -0.5 * kFar_m, 0.5 * kFar_m, kFar_m};
@@ -280,24 +279,14 @@ Result<MeasuredPasses> measured_passes(const Bar& nominal, const Plan& plan,
                                        std::span<const PassTouches> touches,
                                        const ObserveLimits& limits) {
   const Result<MfbMachine> machine = machine_without_limits();
-  if (!machine) {
-    return tl::unexpected(machine.error());
-  }
+  ABBE_TRY(machine);
   Result<Observations> o = observe(nominal, plan, touches, *machine, limits);
-  if (!o) {
-    return tl::unexpected(o.error());
-  }
-  if (Result<void> distinct = check_distinct(plan, touches); !distinct) {
-    return tl::unexpected(distinct.error());
-  }
+  ABBE_TRY(o);
+  ABBE_TRY(check_distinct(plan, touches));
   Result<BarLine> line = line_of_bar(*o);
-  if (!line) {
-    return tl::unexpected(line.error());
-  }
+  ABBE_TRY(line);
   Result<std::vector<bool>> reversed = reversed_passes(plan);
-  if (!reversed) {
-    return tl::unexpected(reversed.error());
-  }
+  ABBE_TRY(reversed);
   return MeasuredPasses{*std::move(o), *std::move(reversed), *std::move(line)};
 }
 
@@ -348,9 +337,7 @@ struct MeasuredGauge {
 
 Result<MeasuredGauge> measured_gauge(const StepGauge& gauge, const BarLine& bar) {
   const Result<GaugeLine> line = line_of_gauge(gauge);
-  if (!line) {
-    return tl::unexpected(line.error());
-  }
+  ABBE_TRY(line);
   return check_alignment(gauge, *line, bar)
       .and_then([&] { return positioning_by_gauge(gauge, *line, bar); })
       .and_then([&](Positioning x) {
@@ -366,25 +353,17 @@ Result<BarCalibration> calibrate_bar(const Bar& nominal, const Plan& plan,
                                      std::span<const PassTouches> touches, const StepGauge& gauge,
                                      const ObserveLimits& limits) {
   const Result<MeasuredPasses> passes = measured_passes(nominal, plan, touches, limits);
-  if (!passes) {
-    return tl::unexpected(passes.error());
-  }
+  ABBE_TRY(passes);
   const Result<MeasuredGauge> measured = measured_gauge(gauge, passes->line);
-  if (!measured) {
-    return tl::unexpected(measured.error());
-  }
+  ABBE_TRY(measured);
 
   BarCalibration found{.bar = nominal};
   found.direction = passes->line.axes.col(0);
   found.gauge_beside_m = measured->beside_bar_m;
   const Result<double> u_rotation = u_rotation_rad(gauge, found.gauge_beside_m);
-  if (!u_rotation) {
-    return tl::unexpected(u_rotation.error());
-  }
+  ABBE_TRY(u_rotation);
   const Result<CalibratedBar> reversal = reversal_of(*passes, measured->x);
-  if (!reversal) {
-    return tl::unexpected(reversal.error());
-  }
+  ABBE_TRY(reversal);
 
   set_points(found, nominal, *reversal);
   set_uncertainty(found,
@@ -410,16 +389,12 @@ Result<Vector3> direction_of_bar(const Bar& nominal, const Plan& plan,
 Result<void> check_pass(const Bar& nominal, const Plan& plan, std::size_t measurement,
                         const PassTouches& touches, const ObserveLimits& limits) {
   const Result<MfbMachine> machine = machine_without_limits();
-  if (!machine) {
-    return tl::unexpected(machine.error());
-  }
+  ABBE_TRY(machine);
   Plan alone = plan;
   alone.measurements = {plan.measurements[measurement]};
   const Result<Observations> observed =
       observe(nominal, alone, std::span(&touches, 1), *machine, limits);
-  if (!observed) {
-    return tl::unexpected(observed.error());
-  }
+  ABBE_TRY(observed);
   return {};
 }
 

@@ -4,6 +4,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -66,9 +67,7 @@ double u_of_direction(const Observations& o, const Matrix3& axes) {
 
 Result<BarLine> line_of_bar(const Observations& o) {
   const Result<AxisAlongBar> along = axis_along_bar(o.plan);
-  if (!along) {
-    return tl::unexpected(along.error());
-  }
+  ABBE_TRY(along);
 
   BarLine line{.along = *along, .length_m = o.bar.O_m.back().x()};
   line.coordinate_m.assign(o.bar.O_m.size(), 0.0);

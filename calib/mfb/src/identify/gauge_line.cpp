@@ -10,6 +10,7 @@
 #include "abbe/calib/internal/statistics/elementary.hpp"
 #include "abbe/calib/internal/statistics/median.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -247,9 +248,7 @@ double u_of_scale(const StepGauge& gauge) {
 }  // namespace
 
 Result<GaugeLine> line_of_gauge(const StepGauge& gauge) {
-  if (Result<void> valid = check_gauge(gauge); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_gauge(gauge));
   GaugeLine line;
   for (const GaugeFace& face : gauge.faces) {
     line.face_m.push_back(mean_reading(face));

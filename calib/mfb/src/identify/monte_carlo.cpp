@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/mfb/observe/quick_extraction.hpp"
 #include "abbe/calib/internal/mfb/solve/shared_unknowns.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/linear_estimator.hpp"
 
 namespace abbe::calib::mfb {
@@ -121,9 +122,7 @@ Result<Eigen::VectorXd> Trials::next() {
   std::vector<std::optional<BarPose>> pose(o_.positions.size());
   for (std::size_t m = 0; m < passes_.size(); ++m) {
     const Result<BarPoints> found = touched(passes_[m]);
-    if (!found) {
-      return tl::unexpected(found.error());
-    }
+    ABBE_TRY(found);
     const PassObservation& pass = o_.passes[m];
     std::optional<BarPose>& of_position = pose[pass.position];
     if (!of_position) {
@@ -165,9 +164,7 @@ Result<Trials> trials_of(const Observations& o, const Solution& solution,
                          const SolveOptions& options, std::uint64_t seed) {
   const std::vector<NominalTouch> touches = nominal_touches(o.bar.pattern, o.plan.tip_radius_m);
   Result<LinearEstimator> estimator = linear_estimator(o, options);
-  if (!estimator) {
-    return tl::unexpected(estimator.error());
-  }
+  ABBE_TRY(estimator);
   return nominal_points(o, touches).map([&](std::vector<Vector3> O_m) {
     Trials trials(o, *std::move(estimator), std::move(O_m), seed);
     for (const PassObservation& pass : o.passes) {
@@ -186,17 +183,13 @@ Result<MonteCarlo> monte_carlo(const Observations& o, const Solution& solution,
                    message("Monte Carlo: ", trial.trials, " trials, at least 2 are needed"));
   }
   Result<Trials> trials = trials_of(o, solution, options, trial.seed);
-  if (!trials) {
-    return tl::unexpected(trials.error());
-  }
+  ABBE_TRY(trials);
 
   const auto count = static_cast<double>(trial.trials);
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(solution.U.size()), squares = sum;
   for (std::size_t i = 0; i < trial.trials; ++i) {
     const Result<Eigen::VectorXd> U = trials->next();
-    if (!U) {
-      return tl::unexpected(U.error());
-    }
+    ABBE_TRY(U);
     const Eigen::VectorXd off = *U - solution.U;
     sum += off;
     squares += off.cwiseAbs2();

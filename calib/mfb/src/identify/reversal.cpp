@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -77,9 +78,7 @@ struct PairOfPasses {
 }  // namespace
 
 Result<CalibratedBar> calibrate_by_reversal(const ReversalRuns& runs) {
-  if (Result<void> valid = check(runs); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(runs));
 
   const auto repeats = static_cast<double>(runs.normal.size());
   CalibratedBar bar;

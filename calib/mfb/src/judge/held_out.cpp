@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/without_pass.hpp"
 
 namespace abbe::calib::mfb {
@@ -279,9 +280,7 @@ Result<void> compare_with_active(HeldOutFigures& figures, const Observations& al
     return {};
   }
   const Result<JointSystem> system = joint_system(o, nuisance_options(options));
-  if (!system) {
-    return tl::unexpected(system.error());
-  }
+  ABBE_TRY(system);
   const StackedRows own(*system, Unknowns::WithoutTables);
   const LeftOutPoints of_active = left_out(
       o, *system, own, own,
@@ -316,9 +315,7 @@ Result<void> compare_with_active(HeldOutFigures& figures, const Observations& al
 Result<HeldOutFigures> held_out(const Observations& o, const Solution& solution,
                                 const VolumetricModel* active, const SolveOptions& options) {
   const Result<JointSystem> system = joint_system(o, nuisance_options(options));
-  if (!system) {
-    return tl::unexpected(system.error());
-  }
+  ABBE_TRY(system);
   const StackedRows own(*system, Unknowns::WithoutTables);
   const StackedRows all(*system, Unknowns::All);
   const Eigen::VectorXd y = whitened_deviations(*system);
@@ -336,10 +333,7 @@ Result<HeldOutFigures> held_out(const Observations& o, const Solution& solution,
   figures.no_compensation_rms_m = figure_of(none).rms_m();
   figures.candidate_rms_m = figure_of(candidate).rms_m();
   if (active != nullptr) {
-    if (Result<void> compared = compare_with_active(figures, o, candidate, *active, options);
-        !compared) {
-      return tl::unexpected(compared.error());
-    }
+    ABBE_TRY(compare_with_active(figures, o, candidate, *active, options));
   }
   return figures;
 }

@@ -5,6 +5,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/bar_temperature.hpp"
 
 namespace abbe::calib::mfb {
@@ -91,9 +92,7 @@ Result<Verdict> judge(const Identification& found, const VolumetricModel* active
                       const JudgeOptions& options) {
   const Result<HeldOutFigures> figures =
       held_out(found.observations, found.solution, active, options.solve);
-  if (!figures) {
-    return tl::unexpected(figures.error());
-  }
+  ABBE_TRY(figures);
   Verdict verdict = decide(found.model, *figures, options.limits, active);
   judge_chi_square(verdict, found);
   judge_set_aside(verdict, found);

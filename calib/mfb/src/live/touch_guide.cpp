@@ -7,6 +7,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "live/guided_pass.hpp"
 
 namespace abbe::calib::mfb {
@@ -243,9 +244,7 @@ TouchGuide::~TouchGuide() = default;
 
 Result<TouchGuide> TouchGuide::create(Bar bar, Plan plan, MfbMachine machine,
                                       GuideOptions options) {
-  if (const Result<Observations> o = planned_observations(bar, plan, machine); !o) {
-    return tl::unexpected(o.error());
-  }
+  ABBE_TRY(planned_observations(bar, plan, machine));
   return TouchGuide(
       std::make_unique<Session>(std::move(bar), std::move(plan), std::move(machine), options));
 }

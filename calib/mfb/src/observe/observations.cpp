@@ -5,6 +5,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/mfb/observe/pass_touches.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -96,9 +97,7 @@ Result<Observations> observations_of_plan(const Bar& bar, const Plan& plan,
           .and_then([&](ParameterLayout layout) {
             return TableBasis::of(std::move(layout), TableOptions::all_axes(machine.interpolation));
           });
-  if (!basis) {
-    return tl::unexpected(basis.error());
-  }
+  ABBE_TRY(basis);
 
   Observations o{bar, plan, *std::move(basis), {}, {}, {}};
   o.plan.gravity.normalize();
@@ -126,9 +125,7 @@ Result<void> place_touches(Observations& o, PassObservation& pass, NominalBar& n
     return error;
   };
   Result<Eigen::MatrixXd> derivatives = nominal.dO_dtouch(places).map_error(named);
-  if (!derivatives) {
-    return tl::unexpected(derivatives.error());
-  }
+  ABBE_TRY(derivatives);
 
   const BarPose& pose = o.positions[pass.position].pose;
   pass.dO_dtouch = *std::move(derivatives);

@@ -9,6 +9,7 @@
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/mfb/observe/pass_touches.hpp"
 #include "abbe/calib/internal/mfb/run/orientation.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/observations.hpp"
 
 namespace abbe::calib::mfb {
@@ -110,9 +111,7 @@ Result<ExtractedBar> checked_bar(const Observations& o, const PassObservation& p
                 .and_then([&] { return check_orientation(bar, o.bar, true); })
                 .and_then([&] { return check_beside_plan(bar.pose, planned, limits); })
                 .and_then([&] { return check_calibrated_places(bar, o.bar, limits); });
-        if (!valid) {
-          return tl::unexpected(valid.error());
-        }
+        ABBE_TRY(valid);
         return bar;
       })
       .map_error([&](Error error) {
@@ -155,13 +154,9 @@ Result<void> observe_pass(Observations& o, PassObservation& pass, const PassTouc
                           NominalBar& nominal, const ObserveLimits& limits, bool sets_pose) {
   const Result<SortedTouches> sorted =
       sorted_touches(o.bar.pattern, o.plan.measurements[pass.measurement], touches);
-  if (!sorted) {
-    return tl::unexpected(sorted.error());
-  }
+  ABBE_TRY(sorted);
   const Result<ExtractedBar> found = checked_bar(o, pass, *sorted, limits);
-  if (!found) {
-    return tl::unexpected(found.error());
-  }
+  ABBE_TRY(found);
 
   if (sets_pose) {
     o.positions[pass.position].pose = found->pose;
@@ -191,11 +186,7 @@ Result<Observations> observe(const Bar& bar, const Plan& plan, std::span<const P
   for (PassObservation& pass : o->passes) {
     const bool first = !has_pose[pass.position];
     has_pose[pass.position] = true;
-    if (Result<void> done =
-            observe_pass(*o, pass, touches[pass.measurement], nominal, limits, first);
-        !done) {
-      return tl::unexpected(done.error());
-    }
+    ABBE_TRY(observe_pass(*o, pass, touches[pass.measurement], nominal, limits, first));
   }
   return o;
 }
@@ -218,11 +209,7 @@ Result<Observations> planned_observations(const Bar& bar, const Plan& plan,
   }
   for (PassObservation& pass : o->passes) {
     const bool is_forward = plan.measurements[pass.measurement].direction == PassDirection::Forward;
-    if (Result<void> placed =
-            place_touches(*o, pass, nominal, all, is_forward ? forward : backward);
-        !placed) {
-      return tl::unexpected(placed.error());
-    }
+    ABBE_TRY(place_touches(*o, pass, nominal, all, is_forward ? forward : backward));
   }
   return o;
 }

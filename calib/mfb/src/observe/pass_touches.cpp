@@ -6,6 +6,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/mfb/observe/bar_points.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -78,9 +79,7 @@ Result<SortedTouches> sorted_touches(const TouchPattern& pattern, const Measurem
     row_at[*place] = row;
     used[*place] = !touch.set_aside;
   }
-  if (Result<void> valid = check_counts(pattern, m, used); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_counts(pattern, m, used));
 
   SortedTouches sorted;
   const double last = std::max(1.0, static_cast<double>(touches.size()) - 1.0);
@@ -150,13 +149,9 @@ Result<void> check_features(const BarFeatures& f, const TouchPattern& pattern, d
 
 Result<ExtractedBar> extracted(const BarTouches& touches, const Matrix3& axes) {
   Result<BarFeatures> features = fit_features(touches, axes);
-  if (!features) {
-    return tl::unexpected(features.error());
-  }
+  ABBE_TRY(features);
   Result<BarPoints> points = bar_points(*features, axes);
-  if (!points) {
-    return tl::unexpected(points.error());
-  }
+  ABBE_TRY(points);
   return ExtractedBar{*std::move(features), std::move(points->O_m), points->pose};
 }
 

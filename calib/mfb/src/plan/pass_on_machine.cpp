@@ -6,6 +6,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -183,15 +184,9 @@ Result<void> check_room(const Bar& bar, double tip_radius_m, const MachineTouchO
 
 Result<PassOnMachine> pass_on_machine(const Bar& bar, const Plan& plan, std::size_t measurement,
                                       const Vector3& from_m, const MachineTouchOptions& options) {
-  if (auto valid = check(plan, bar); !valid) {
-    return tl::unexpected(valid.error());
-  }
-  if (auto valid = check(options); !valid) {
-    return tl::unexpected(valid.error());
-  }
-  if (auto fits = check_room(bar, plan.tip_radius_m, options); !fits) {
-    return tl::unexpected(fits.error());
-  }
+  ABBE_TRY(check(plan, bar));
+  ABBE_TRY(check(options));
+  ABBE_TRY(check_room(bar, plan.tip_radius_m, options));
 
   const Measurement& m = plan.measurements[measurement];
   const double cosine = m.axes().col(2).dot(plan.measurements.front().axes().col(2));
@@ -224,9 +219,7 @@ Result<PassOnMachine> pass_on_machine(const Bar& bar, const Plan& plan, std::siz
 Result<MachineTouches> gauge_on_machine(const StepGauge& gauge, const Measurement& normal,
                                         std::size_t runs, const Vector3& from_m,
                                         const MachineTouchOptions& options) {
-  if (auto valid = check(options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(options));
   if (runs == 0 || gauge.faces.empty()) {
     return failure(ErrorCode::BadInput, "step gauge: needs at least one face and one run");
   }

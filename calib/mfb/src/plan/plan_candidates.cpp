@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "plan/plan_place.hpp"
 
 namespace abbe::calib::mfb {
@@ -125,9 +126,7 @@ class CandidateList {
 }  // namespace
 
 Result<std::vector<PlannedPosition>> candidate_positions(const PlanTask& task) {
-  if (Result<void> valid = check(task); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(task));
   CandidateList list(task);
   for (std::size_t holes = 0; holes < 3; ++holes) {
     for (const StyliOfPosition& styli : styli_choices(task, holes)) {

@@ -6,6 +6,7 @@
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/mfb/plan/plan.hpp"
+#include "abbe/result/try.hpp"
 #include "plan/plan_problem.hpp"
 
 namespace abbe::calib::mfb {
@@ -69,9 +70,7 @@ class Choice {
         return running;
       }
       Result<PositionInformation> one = predictor.position(measurements_of(task_, position));
-      if (!one) {
-        return tl::unexpected(one.error());
-      }
+      ABBE_TRY(one);
       pool_.information.push_back(*std::move(one));
     }
     chosen_.resize(start.size());
@@ -173,29 +172,19 @@ Result<ChosenSet> choose_set(const PlanTask& task, const std::vector<PlannedPosi
                              const ChoiceOptions& options) {
   const Plan first_plan = plan_of(task, start);
   const Result<Observations> planned = planned_observations(task.bar, first_plan, task.machine);
-  if (!planned) {
-    return tl::unexpected(planned.error());
-  }
+  ABBE_TRY(planned);
   const Result<PlanPredictor> predictor =
       PlanPredictor::of(task.bar, first_plan, task.machine, options.solve);
-  if (!predictor) {
-    return tl::unexpected(predictor.error());
-  }
+  ABBE_TRY(predictor);
   Result<std::vector<PlannedPosition>> candidates = candidate_positions(task);
-  if (!candidates) {
-    return tl::unexpected(candidates.error());
-  }
+  ABBE_TRY(candidates);
 
   ChosenSet chosen;
   chosen.candidates = candidates->size();
   Choice choice(task, options);
-  if (Result<void> done = choice.collect(start, *std::move(candidates), *predictor); !done) {
-    return tl::unexpected(done.error());
-  }
+  ABBE_TRY(choice.collect(start, *std::move(candidates), *predictor));
   const std::vector<std::size_t> at_start = choice.chosen();
-  if (Result<void> done = choice.exchange(SetProblem(*planned, options.solve)); !done) {
-    return tl::unexpected(done.error());
-  }
+  ABBE_TRY(choice.exchange(SetProblem(*planned, options.solve)));
 
   chosen.start = predictor->predict(choice.pool().of(at_start));
   chosen.prediction = predictor->predict(choice.pool().of(choice.chosen()));

@@ -5,6 +5,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/observations.hpp"
 
 namespace abbe::calib::mfb {
@@ -93,9 +94,7 @@ Result<PositionInformation> PlanPredictor::position(std::span<const Measurement>
   Plan plan = parts_->plan;
   plan.measurements.assign(passes.begin(), passes.end());
   const Result<Observations> o = planned_observations(parts_->bar, plan, parts_->machine);
-  if (!o) {
-    return tl::unexpected(o.error());
-  }
+  ABBE_TRY(o);
   if (o->positions.size() != 1) {
     return failure(ErrorCode::BadInput, message("prediction of a position: the passes are of ",
                                                 o->positions.size(), " positions"));
@@ -145,16 +144,12 @@ Result<PlanPrediction> predict(const Bar& bar, const Plan& plan, const MfbMachin
     return tl::unexpected(valid.error());
   }
   const Result<PlanPredictor> predictor = PlanPredictor::of(bar, plan, machine, options);
-  if (!predictor) {
-    return tl::unexpected(predictor.error());
-  }
+  ABBE_TRY(predictor);
 
   std::vector<PositionInformation> positions;
   for (const std::vector<Measurement>& passes : by_position(plan)) {
     Result<PositionInformation> position = predictor->position(passes);
-    if (!position) {
-      return tl::unexpected(position.error());
-    }
+    ABBE_TRY(position);
     positions.push_back(*std::move(position));
   }
   std::vector<const PositionInformation*> all;

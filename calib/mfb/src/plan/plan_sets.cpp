@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "plan/plan_place.hpp"
 
 namespace abbe::calib::mfb {
@@ -286,14 +287,10 @@ std::size_t PlannedSet::measurements() const {
 
 Result<PlannedSet> named_set(NamedSet set, const PlanTask& task,
                              const std::optional<Vector3>& centre_m) {
-  if (Result<void> valid = check(task); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(task));
   SetPlacer placer(task, set, centre_m.value_or(middle_of_travel(task)));
   for (const Entry& entry : entries_of(set)) {
-    if (Result<void> added = placer.add(entry); !added) {
-      return tl::unexpected(added.error());
-    }
+    ABBE_TRY(placer.add(entry));
   }
   return placer.take();
 }

@@ -1,6 +1,7 @@
 #include "abbe/calib/mfb/run/features.hpp"
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -136,9 +137,7 @@ Result<BarFeatures> fit_features(const BarTouches& touches, const Matrix3& axes)
           .and_then([&] { return fit_planes(features, touches, axes.col(1)); })
           .and_then([&] { return check_order(features, axes.col(0)); })
           .and_then([&] { return check_sides(features, axes.col(1)); });
-  if (!done) {
-    return tl::unexpected(done.error());
-  }
+  ABBE_TRY(done);
   return features;
 }
 

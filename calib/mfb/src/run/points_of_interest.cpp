@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -148,9 +149,7 @@ Result<std::vector<std::array<Derived, 2>>> ends_of_rods(const DerivedFeatures& 
       Result<Derived> end =
           intersection(f.rods[j], f.planes[j][side],
                        message(rod_name(j), " and ", plane_name(j, static_cast<Side>(side))));
-      if (!end) {
-        return tl::unexpected(end.error());
-      }
+      ABBE_TRY(end);
       pair[side] = *std::move(end);
     }
   }
@@ -189,14 +188,10 @@ Eigen::MatrixXd PointsOfInterest::covariance_bar_m2(double u_m) const {
 
 Result<PointsOfInterest> points_of_interest(const BarTouches& touches, const Matrix3& axes) {
   const Result<BarFeatures> fitted = fit_features(touches, axes);
-  if (!fitted) {
-    return tl::unexpected(fitted.error());
-  }
+  ABBE_TRY(fitted);
   DerivedFeatures f(touches, *fitted);
   const auto ends = ends_of_rods(f);
-  if (!ends) {
-    return tl::unexpected(ends.error());
-  }
+  ABBE_TRY(ends);
 
   const Vector3 up = axes.col(2);
   const auto& first = ends->front();
@@ -211,9 +206,7 @@ Result<PointsOfInterest> points_of_interest(const BarTouches& touches, const Mat
                : plane_through({(*ends)[i - 1][0], (*ends)[i - 1][1], (*ends)[i][0], (*ends)[i][1]},
                                up);
     Result<Derived> point = intersection(f.holes[i], plane, hole_name(i));
-    if (!point) {
-      return tl::unexpected(point.error());
-    }
+    ABBE_TRY(point);
     result.O_m.push_back(point->value);
     O.push_back(*std::move(point));
   }

@@ -6,6 +6,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/likely_cause.hpp"
 #include "solve/set_aside_touches.hpp"
 
@@ -174,14 +175,10 @@ Result<Identification> identify(const Bar& bar, const Plan& plan,
                                                            machine, options, outliers)
                                         : Result<Adjusted>(std::move(first));
       });
-  if (!at) {
-    return tl::unexpected(at.error());
-  }
+  ABBE_TRY(at);
 
   Result<VolumetricModel> model = model_of(at->observations, at->solution);
-  if (!model) {
-    return tl::unexpected(model.error());
-  }
+  ABBE_TRY(model);
   LikelyCause cause = options.solve.estimator == Estimator::Joint
                           ? likely_cause(at->observations, at->solution, options.solve)
                           : cause_of_sequence(at->solution.statistics);

@@ -6,6 +6,7 @@
 
 #include "abbe/calib/internal/estimation/null_space.hpp"
 #include "abbe/calib/internal/statistics/quantile_999.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/budget.hpp"
 #include "solve/residuals.hpp"
 #include "solve/triangle.hpp"
@@ -86,9 +87,7 @@ Result<JointSystem> joint_system(const Observations& o, const NuisanceOptions& o
   JointSystem system{nominal_touches(o.bar.pattern, o.plan.tip_radius_m), SharedUnknowns(o), {}};
   for (std::size_t i = 0; i < o.positions.size(); ++i) {
     Result<PositionSystem> position = position_system(o, i, system.shared, options);
-    if (!position) {
-      return tl::unexpected(position.error());
-    }
+    ABBE_TRY(position);
     system.positions.push_back(*std::move(position));
   }
   return system;
@@ -151,9 +150,7 @@ Result<double> joint_chi2(const Observations& o, const NuisanceOptions& options)
 
 Result<Solution> solve_joint(const Observations& o, const NuisanceOptions& options) {
   const Result<JointSystem> system = joint_system(o, options);
-  if (!system) {
-    return tl::unexpected(system.error());
-  }
+  ABBE_TRY(system);
   const SharedEstimate estimate = estimate_of(*system);
   const SharedUnknowns& shared = system->shared;
 

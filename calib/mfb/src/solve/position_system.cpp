@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -156,16 +157,12 @@ Result<PositionSystem> position_system(const Observations& o, std::size_t positi
   for (std::size_t k = 0; k < s.passes.size(); ++k) {
     const PassObservation& pass = o.passes[s.passes[k]];
     Result<RootOfNoise> root = root_of_noise(o.plan.noise, pass);
-    if (!root) {
-      return tl::unexpected(root.error());
-    }
+    ABBE_TRY(root);
     append_pass(s, s.rows_of_pass * static_cast<Eigen::Index>(k), shared_rows(o, pass, shared),
                 nuisance_rows(o, pass, k, s.layout, options), pass.delta_m, *root);
     s.root.push_back(*std::move(root));
   }
-  if (Result<void> done = eliminate_nuisances(s, o.positions[position].name); !done) {
-    return tl::unexpected(done.error());
-  }
+  ABBE_TRY(eliminate_nuisances(s, o.positions[position].name));
   return s;
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 
@@ -155,9 +156,7 @@ void Sequence::impose_gauge(ErrorMotion motion, Eigen::Ref<Eigen::MatrixXd> rows
 
 Result<void> Sequence::set(ErrorMotion motion, const HoleRows& values, std::size_t m) {
   const Result<HoleRows> found = at_nodes(motion.axis, values, m);
-  if (!found) {
-    return tl::unexpected(found.error());
-  }
+  ABBE_TRY(found);
   const auto first = static_cast<Eigen::Index>(o_.basis.layout().find(motion)->offset);
   U_.middleRows(first, found->rows()) = *found;
   impose_gauge(motion, U_.middleRows(first, found->rows()));

@@ -6,6 +6,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/mfb/solve/joint.hpp"
 #include "abbe/calib/internal/statistics/quantile_999.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/residuals.hpp"
 #include "solve/sequence.hpp"
 
@@ -21,9 +22,7 @@ Result<Sequence> finished_sequence(const Observations& o) {
   std::vector<Profile> profiles = profiles_of(o);
   return roles_of(profiles).and_then([&](SequentialRoles roles) -> Result<Sequence> {
     Sequence sequence(o, std::move(profiles), std::move(roles));
-    if (Result<void> done = sequence.run(); !done) {
-      return tl::unexpected(done.error());
-    }
+    ABBE_TRY(sequence.run());
     return sequence;
   });
 }
@@ -42,9 +41,7 @@ Result<Eigen::MatrixXd> root_of_result(const Observations& o, const Sequence& se
     const PassObservation& pass = o.passes[p.passes.front()];
     const Eigen::Index first = rows * static_cast<Eigen::Index>(m);
     const auto root = root_of_noise(o.plan.noise, pass);
-    if (!root) {
-      return tl::unexpected(root.error());
-    }
+    ABBE_TRY(root);
     const Eigen::MatrixXd S = sequence.U().middleCols(1 + first, rows);
     of_noise.middleCols(first, rows) =
         S * Eigen::MatrixXd(root->matrixL()) / std::sqrt(static_cast<double>(p.passes.size()));
@@ -68,9 +65,7 @@ Result<Eigen::MatrixXd> root_of_result(const Observations& o, const Sequence& se
 Result<void> set_residuals_of_sequence(Solution& solution, const Observations& o,
                                        const SolveOptions& options) {
   const Result<JointSystem> system = joint_system(o, nuisance_options(options));
-  if (!system) {
-    return tl::unexpected(system.error());
-  }
+  ABBE_TRY(system);
   SharedEstimate estimate;
   estimate.x = Eigen::VectorXd::Zero(system->shared.size());
   estimate.x.head(system->shared.parameters()) = system->shared.free_of(solution.U);
@@ -102,15 +97,11 @@ Result<Solution> solve_sequential(const Observations& o, const SolveOptions& opt
   return finished_sequence(o).and_then([&](const Sequence& sequence) -> Result<Solution> {
     Solution solution;
     const Result<Eigen::MatrixXd> root = root_of_result(o, sequence, SharedUnknowns(o));
-    if (!root) {
-      return tl::unexpected(root.error());
-    }
+    ABBE_TRY(root);
     solution.U = sequence.U().col(0);
     solution.covariance = *root * root->transpose();
     solution.bar_correction_m = Eigen::VectorXd::Zero(3 * std::ssize(o.bar.O_m));
-    if (Result<void> done = set_residuals_of_sequence(solution, o, options); !done) {
-      return tl::unexpected(done.error());
-    }
+    ABBE_TRY(set_residuals_of_sequence(solution, o, options));
     return solution;
   });
 }

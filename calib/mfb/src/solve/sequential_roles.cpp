@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -156,9 +157,7 @@ Result<SequentialRoles> roles_of(const std::vector<Profile>& all) {
           .and_then([&] {
             return set_diagonals(roles.diagonals[2], all, {Y, Z}, "YZ");
           });
-  if (!found) {
-    return tl::unexpected(found.error());
-  }
+  ABBE_TRY(found);
   return roles;
 }
 

@@ -6,6 +6,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/bar_temperature.hpp"
 #include "solve/sequential.hpp"
 
@@ -82,9 +83,7 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   if (!solution) {
     return solution;
   }
-  if (Result<void> shown = check_shown(o, *solution, options); !shown) {
-    return tl::unexpected(shown.error());
-  }
+  ABBE_TRY(check_shown(o, *solution, options));
   return solution;
 }
 

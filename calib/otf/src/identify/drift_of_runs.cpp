@@ -7,6 +7,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
+#include "abbe/result/try.hpp"
 #include "nests/drift_estimate.hpp"
 #include "solve/drift_columns.hpp"
 #include "solve/run_unknowns.hpp"
@@ -142,9 +143,7 @@ Result<AllDrifts> estimate_all(std::span<const Observations> runs, const DriftUn
       }
       Result<DriftEstimate> e =
           estimate_beside(*runs[k].drift, added.of_run(k), added.others(k), S, g, own, stopped);
-      if (!e) {
-        return tl::unexpected(e.error());
-      }
+      ABBE_TRY(e);
       all.of_run[k] = *std::move(e);
     }
   }
@@ -255,9 +254,7 @@ Result<DriftOfRuns> drift_of_runs(std::span<const Observations> runs, const Adju
     factor_used = factor;
     Result<AllDrifts> found =
         estimate_all(runs, added, reduced.S / factor, reduced.g / factor, stopped);
-    if (!found) {
-      return tl::unexpected(found.error());
-    }
+    ABBE_TRY(found);
     all = *std::move(found);
     out.U = a.U - reduced.dU_dd * all.d;
     out.residual_m = with.residuals_without_m(out.U, all.d);

@@ -6,6 +6,7 @@
 #include "abbe/calib/internal/otf/observe/aligned_blocks.hpp"
 #include "abbe/calib/internal/otf/solve/joint.hpp"
 #include "abbe/calib/internal/otf/solve/prewhitening.hpp"
+#include "abbe/result/try.hpp"
 #include "identify/synchronised.hpp"
 #include "observe/observe_aligned.hpp"
 
@@ -43,9 +44,7 @@ Result<Solution> solve_smooth(Observations& o, const RowInformation& rows, const
         solution = solve(o, rows, options);
         return solution.map([](const Solution& with) { return with.statistics.variance_factor; });
       });
-  if (!chosen) {
-    return tl::unexpected(chosen.error());
-  }
+  ABBE_TRY(chosen);
 
   const std::vector<std::string> notes = notes_on(*chosen);
   o.notes.insert(o.notes.end(), notes.begin(), notes.end());
@@ -56,9 +55,7 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
                              const Noise& noise, const Options& options, AlongRows* along) {
   Result<JointObservations> at_solution =
       linearise_at_solution(std::move(of_alignment), series, noise, options, along);
-  if (!at_solution) {
-    return tl::unexpected(at_solution.error());
-  }
+  ABBE_TRY(at_solution);
 
   Result<Solution> solution =
       solve_smooth(at_solution->observations, at_solution->information,
@@ -68,9 +65,7 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
           })
           .and_then(
               [&](Solution s) { return with_misfit(std::move(s), at_solution->observations); });
-  if (!solution) {
-    return tl::unexpected(solution.error());
-  }
+  ABBE_TRY(solution);
 
   solution->estimator = Estimator::Joint;
   solution->statistics.iterations = at_solution->adjustments;
@@ -84,9 +79,7 @@ Result<Identification> two_step(Observations observations, const Options& option
   if (solution) {
     solution = with_misfit(*std::move(solution), observations);
   }
-  if (!solution) {
-    return tl::unexpected(solution.error());
-  }
+  ABBE_TRY(solution);
   return Identification{std::move(observations), *std::move(solution)};
 }
 
@@ -143,9 +136,7 @@ Result<Identification> identify(std::span<const TrackerObservation> samples, con
   }
 
   Result<AlignedBlocks> run = aligned_blocks(samples, machine, path, noise, options);
-  if (!run) {
-    return tl::unexpected(run.error());
-  }
+  ABBE_TRY(run);
   return observe_with_nests(*run, machine, path, noise, options).and_then([&](Observations o) {
     return identify_observed(std::move(o), run->series, noise, options);
   });

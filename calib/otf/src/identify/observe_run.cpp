@@ -5,6 +5,7 @@
 
 #include "abbe/calib/internal/otf/samples/standstill.hpp"
 #include "abbe/calib/internal/otf/standstill/observe_standstills.hpp"
+#include "abbe/result/try.hpp"
 #include "nests/drift_observations.hpp"
 #include "observe/observe_aligned.hpp"
 #include "run/progress.hpp"
@@ -18,18 +19,14 @@ Result<Observations> observe_standing(std::span<const TrackerObservation> sample
                                       const Options& options) {
   report(options, Stage::Observe, 0.0);
   const Result<NestVisits> nests = find_nest_visits(samples, options.nests, noise);
-  if (!nests) {
-    return tl::unexpected(nests.error());
-  }
+  ABBE_TRY(nests);
   std::vector<TrackerObservation> of_machine(samples.begin(), samples.end());
   for (const std::size_t i : nests->samples) {
     of_machine[i].valid = false;
   }
 
   Result<Standstills> all = find_standstills(of_machine, options.standstill);
-  if (!all) {
-    return tl::unexpected(all.error());
-  }
+  ABBE_TRY(all);
   all->lost_samples -= nests->samples.size();
   report(options, Stage::Observe, 0.5);
   return observe_standstills(*all, machine, path, noise, options).map([&](Observations o) {

@@ -7,6 +7,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/model/tool_span.hpp"
 #include "abbe/calib/internal/otf/solve/joint.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/observe_aligned.hpp"
 #include "solve/change_in_u.hpp"
 #include "solve/priors.hpp"
@@ -66,9 +67,7 @@ Result<void> check_targets(std::span<const TargetRun> runs) {
 Result<ObservedRuns> observe_runs(std::span<const TargetRun> runs, const Machine& machine,
                                   const Noise& noise, const Options& options) {
   const Result<TableBasis> basis = basis_of_all_tables(machine, options.backlash);
-  if (!basis) {
-    return tl::unexpected(basis.error());
-  }
+  ABBE_TRY(basis);
 
   ObservedRuns all;
   for (std::size_t k = 0; k < runs.size(); ++k) {
@@ -113,16 +112,12 @@ Result<int> linearise_runs(ObservedRuns& runs, const Noise& noise, const Options
   Eigen::VectorXd at = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(unknowns.size()));
 
   for (int adjustments = 1; adjustments <= options.max_adjustments; ++adjustments) {
-    if (Result<void> running = check_stopped(options.stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(options.stopped));
 
     const estimation::Information data = information_of_runs(runs.observations);
     const Result<Eigen::VectorXd> U =
         gauge.estimate(data, datum_options(runs.observations, options));
-    if (!U) {
-      return tl::unexpected(U.error());
-    }
+    ABBE_TRY(U);
     if (change_in_u(*U - at, data) < options.adjustment_tolerance) {
       return adjustments;
     }

@@ -7,6 +7,7 @@
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
 #include "abbe/calib/internal/otf/samples/reading_jumps.hpp"
 #include "abbe/calib/internal/statistics/median.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/clock_match.hpp"
 
 namespace abbe::calib::otf {
@@ -154,18 +155,14 @@ Result<Identification> at_corrected_clock(
 Result<Identification> identify_synchronised(
     const Observations& across, const BlockSeries& series, const Noise& noise,
     const Options& options, const std::function<Result<Identification>(AlongRows*)>& estimate) {
-  if (Result<void> valid = check(*options.encoders); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(*options.encoders));
   if (!(series.period_s > 0.0)) {
     return failure(ErrorCode::BadInput, "scale readings: the blocks of the tracker have no times");
   }
   const WithoutJumps kept = without_jumps(*options.encoders);
   const EncoderLog& log = kept.log ? *kept.log : *options.encoders;
   const Result<RunClock> clock = match_clocks(log, across, series);
-  if (!clock) {
-    return tl::unexpected(clock.error());
-  }
+  ABBE_TRY(clock);
 
   AlongRows along(log, *clock);
   constexpr std::size_t kFewestRows = 30;  // fewer do not show their own noise

@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
+#include "abbe/result/try.hpp"
 #include "identify/drift_of_runs.hpp"
 #include "identify/observed_runs.hpp"
 #include "solve/added_columns.hpp"
@@ -255,9 +256,7 @@ Result<FitOfRuns> fit_of_runs(std::span<const Observations> runs, const Adjustme
       return statistics_of_all(statistics_of_runs(runs, a, residuals), a, unknowns).variance_factor;
     };
     Result<DriftOfRuns> found = drift_of_runs(runs, a, residual_m, variance, options.stopped);
-    if (!found) {
-      return tl::unexpected(found.error());
-    }
+    ABBE_TRY(found);
     add_drift(fit, *std::move(found));
     set_figures();
   } else if (runs.front().u_range_offset_m > 0.0) {
@@ -277,9 +276,7 @@ Result<Adjustment> adjust_smooth(std::vector<Observations>& runs, const Options&
   }
 
   const Result<FitOfRuns> first = fit_of_runs(runs, *a, options);
-  if (!first) {
-    return tl::unexpected(first.error());
-  }
+  ABBE_TRY(first);
   std::vector<Observations> judged = runs;
   for (std::size_t k = 0; k < judged.size(); ++k) {
     judged[k] = without_range_offset(std::move(judged[k]), first->offset[k].value_m);
@@ -300,9 +297,7 @@ Result<Adjustment> adjust_smooth(std::vector<Observations>& runs, const Options&
           });
         });
       });
-  if (!chosen) {
-    return tl::unexpected(chosen.error());
-  }
+  ABBE_TRY(chosen);
 
   const std::vector<std::string> notes = notes_on(*chosen);
   runs.front().notes.insert(runs.front().notes.end(), notes.begin(), notes.end());
@@ -319,15 +314,11 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
   }
 
   Result<Adjustment> a = adjust_smooth(runs, options);
-  if (!a) {
-    return tl::unexpected(a.error());
-  }
+  ABBE_TRY(a);
 
   const Adjustment of_rows = *a;
   Result<FitOfRuns> found_fit = fit_of_runs(runs, *a, options);
-  if (!found_fit) {
-    return tl::unexpected(found_fit.error());
-  }
+  ABBE_TRY(found_fit);
   FitOfRuns& fit = *found_fit;
   a->U = std::move(fit.U);
   std::optional<FoundMisfit> misfit =
@@ -353,9 +344,7 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                                 misfit->notes.end());
     }
   }
-  if (!model) {
-    return tl::unexpected(model.error());
-  }
+  ABBE_TRY(model);
 
   const Estimator estimator =
       options.mode == Mode::OnTheFly ? options.estimator : Estimator::TwoStep;
@@ -384,9 +373,7 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
 Result<TargetsIdentification> identify_targets(std::span<const TargetRun> runs,
                                                const Machine& machine, const Noise& noise,
                                                const Options& options) {
-  if (Result<void> valid = check_targets(runs); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_targets(runs));
   if (options.encoders != nullptr) {
     return failure(
         ErrorCode::BadInput,
@@ -395,16 +382,12 @@ Result<TargetsIdentification> identify_targets(std::span<const TargetRun> runs,
   }
 
   Result<ObservedRuns> observed = observe_runs(runs, machine, noise, options);
-  if (!observed) {
-    return tl::unexpected(observed.error());
-  }
+  ABBE_TRY(observed);
 
   int adjustments = 1;
   if (options.estimator == Estimator::Joint && options.mode == Mode::OnTheFly) {
     const Result<int> linearised = linearise_runs(*observed, noise, options);
-    if (!linearised) {
-      return tl::unexpected(linearised.error());
-    }
+    ABBE_TRY(linearised);
     adjustments = *linearised;
   }
 

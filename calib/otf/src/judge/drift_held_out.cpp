@@ -5,6 +5,7 @@
 
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
 #include "abbe/calib/otf/judge/lack_of_fit.hpp"
+#include "abbe/result/try.hpp"
 #include "nests/drift_estimate.hpp"
 #include "solve/run_statistics.hpp"
 
@@ -23,9 +24,7 @@ Result<Eigen::VectorXd> DriftHeldOut::correct(Eigen::VectorXd& U, const Adjustme
   DriftEquations equations{.S = reduced.S / factor};
   equations.g = reduced.g / factor + equations.S * removed_.coefficients;
   const Result<DriftEstimate> estimate = estimate_drift(*o_.drift, equations, stopped);
-  if (!estimate) {
-    return tl::unexpected(estimate.error());
-  }
+  ABBE_TRY(estimate);
 
   Eigen::VectorXd change = estimate->d - removed_.coefficients;
   U -= reduced.dU_dd * change;

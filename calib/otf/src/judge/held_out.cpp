@@ -11,6 +11,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/otf/judge/held_out_rows.hpp"
 #include "abbe/calib/otf/judge/judge.hpp"
+#include "abbe/result/try.hpp"
 #include "judge/drift_held_out.hpp"
 #include "run/progress.hpp"
 #include "solve/priors.hpp"
@@ -81,14 +82,10 @@ Result<FittedFold> fit_fold(const RunByFold& first, const estimation::Informatio
   }
 
   const Result<Adjustment> a = gauge.solve(training, {.weight = options.gauge_weight});
-  if (!a) {
-    return tl::unexpected(a.error());
-  }
+  ABBE_TRY(a);
   FittedFold fitted{a->U};
   Result<Eigen::VectorXd> change = first.drift->correct(fitted.U, *a, take, options.stopped);
-  if (!change) {
-    return tl::unexpected(change.error());
-  }
+  ABBE_TRY(change);
   fitted.change_of_drift = *std::move(change);
   return fitted;
 }
@@ -173,13 +170,9 @@ Result<HeldOutFigures> held_out(std::span<const Observations> observed,
   HeldOutSums sums;
 
   for (std::size_t f = 0; f < folds; ++f) {
-    if (Result<void> running = check_stopped(options.stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(options.stopped));
     const Result<HeldOutFold> fit = hold_out(runs, f, folds, options);
-    if (!fit) {
-      return tl::unexpected(fit.error());
-    }
+    ABBE_TRY(fit);
     for (std::size_t k = 0; k < fit->rows.size(); ++k) {
       const Observations& o = observed[k];
       const Eigen::VectorXd U = unknowns.part(fit->U, k);

@@ -12,6 +12,7 @@
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/observe/orientation.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -154,16 +155,12 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
     runs.push_back(without_run_effects(measured[k], solutions[k]));
     Result<std::vector<Alternative>> of_run =
         alternatives(runs.back(), solutions[k], options, tables);
-    if (!of_run) {
-      return tl::unexpected(of_run.error());
-    }
+    ABBE_TRY(of_run);
     others.push_back(*std::move(of_run));
   }
 
   const Result<HeldOutFigures> figures = held_out(runs, active, options, row, solutions);
-  if (!figures) {
-    return tl::unexpected(figures.error());
-  }
+  ABBE_TRY(figures);
 
   const Solution& solution = solutions.front();
   Verdict verdict = decide(solution.model, *figures, limits, active);

@@ -16,6 +16,7 @@
 #include "abbe/calib/internal/statistics/elementary.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 #include "judge/alternative_columns.hpp"
 #include "run/sparse_grid.hpp"
 #include "solve/added_columns.hpp"
@@ -109,9 +110,7 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
   const double noise = std::max(1.0, fit.noise.local * fit.noise.local);
 
   for (const auto& [added, sums] : family) {
-    if (Result<void> running = check_stopped(options.stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(options.stopped));
     AddedColumns::Estimate e = sums.estimate(fit.adjustment.cofactor_Q, noise * chi2_bound(1.0, x));
     const bool significant = e.drop > noise * chi2_bound(static_cast<double>(e.columns), x);
     if (significant && e.drop > best_estimate.drop) {
@@ -191,9 +190,7 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   }
 
   const Observations other = with_basis(fit.o, *std::move(basis));
-  if (Result<void> running = check_stopped(options.stopped); !running) {
-    return tl::unexpected(running.error());
-  }
+  ABBE_TRY(check_stopped(options.stopped));
 
   const Result<Adjustment> a = adjust(information_of(other), other, options.gauge_weight);
   if (!a || other.rows.size() <= a->rank) {
@@ -368,9 +365,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
     Result<std::optional<Alternative>> best =
         has_prior ? offset_beyond_prior(fit, columns, family, solution.range_offset)
                   : best_of(fit, columns, family, options);
-    if (!best) {
-      return tl::unexpected(best.error());
-    }
+    ABBE_TRY(best);
     if (*best) {
       found.push_back(**std::move(best));
     }
@@ -379,9 +374,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   if (fit.noise.variance_factor() > kSuspicious && fit.excess() > 0.0) {
     for (const auto design : other_designs(tables)) {
       Result<std::optional<Alternative>> better = design(fit, solution, options);
-      if (!better) {
-        return tl::unexpected(better.error());
-      }
+      ABBE_TRY(better);
       if (*better) {
         found.push_back(**std::move(better));
       }

@@ -11,6 +11,7 @@
 #include "abbe/calib/model/gauge.hpp"
 #include "abbe/calib/otf/solve/backlash.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -104,20 +105,14 @@ std::size_t TableSoFar::determined_nodes() const {
 Result<RunningEstimate> RunningEstimate::of(Setup setup) {
   auto layout =
       ParameterLayout::observable_with_one_target(setup.machine.chain, setup.machine.nodes);
-  if (!layout) {
-    return tl::unexpected(layout.error());
-  }
+  ABBE_TRY(layout);
   auto basis = TableBasis::of(*std::move(layout), {.travel = setup.backlash});
-  if (!basis) {
-    return tl::unexpected(basis.error());
-  }
+  ABBE_TRY(basis);
 
   RunningEstimate estimate(std::move(setup), *std::move(basis));
   // The noise is checked here, not at the first pose.
   auto moments = MomentAccumulator::of({.basis = estimate.basis_, .noise = estimate.setup_.noise});
-  if (!moments) {
-    return tl::unexpected(moments.error());
-  }
+  ABBE_TRY(moments);
   return estimate;
 }
 

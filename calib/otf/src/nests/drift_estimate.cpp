@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 #include "nests/nest_places.hpp"
 
 namespace abbe::calib::otf {
@@ -41,9 +42,7 @@ Result<DriftEstimate> estimate_drift(const DriftObservations& d, const DriftEqua
                                      const Stopped& stopped) {
   const DriftLikelihood likelihood(d, equations);
   const Result<PlacesFound> found = find_places(likelihood, stopped);
-  if (!found) {
-    return tl::unexpected(found.error());
-  }
+  ABBE_TRY(found);
 
   DriftEstimate e = mean_estimate(likelihood, found->grid);
   e.visits = visits_used(found->place);

@@ -7,6 +7,7 @@
 
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -105,9 +106,7 @@ Result<LikelihoodGrid> DriftLikelihood::grid(const NestPlaces& place,
   LikelihoodGrid grid;
   for (const DriftCourse course : kDriftCourses) {
     for (const double factor : kRepeatabilityFactors) {
-      if (Result<void> running = check_stopped(stopped); !running) {
-        return tl::unexpected(running.error());
-      }
+      ABBE_TRY(check_stopped(stopped));
       grid.equations.push_back(scaled(place, factor * d_.u_repeatability_m, course));
       double amplitude_m = kLeastAmplitude_m;
       for (int k = 0; k < kAmplitudes; ++k, amplitude_m *= 2.0) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -114,9 +115,7 @@ Result<std::optional<PlacesFound>> better_places(const DriftLikelihood& likeliho
   for (const std::size_t worst : suspicious_visits(found.place, sizes)) {
     for (NestPlaces& other : other_places(found.place, worst, measured_m)) {
       Result<LikelihoodGrid> grid = likelihood.grid(other, stopped);
-      if (!grid) {
-        return tl::unexpected(grid.error());
-      }
+      ABBE_TRY(grid);
       if (grid->best().log_likelihood > most) {
         most = grid->best().log_likelihood;
         better = PlacesFound{std::move(other), *std::move(grid)};
@@ -150,16 +149,12 @@ std::optional<std::size_t> visit_to_compare(const DriftObservations& d, const Ne
 Result<PlacesFound> find_places(const DriftLikelihood& likelihood, const Stopped& stopped) {
   NestPlaces place = places_of_nests(likelihood.observations());
   Result<LikelihoodGrid> grid = likelihood.grid(place, stopped);
-  if (!grid) {
-    return tl::unexpected(grid.error());
-  }
+  ABBE_TRY(grid);
 
   PlacesFound found{std::move(place), *std::move(grid)};
   for (std::size_t round = 0; round < found.place.size(); ++round) {
     Result<std::optional<PlacesFound>> better = better_places(likelihood, found, stopped);
-    if (!better) {
-      return tl::unexpected(better.error());
-    }
+    ABBE_TRY(better);
     if (!*better) {
       break;
     }

@@ -6,6 +6,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/otf/observe/observe.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/observe_aligned.hpp"
 #include "observe/off_line_samples.hpp"
 #include "observe/off_time_samples.hpp"
@@ -139,15 +140,11 @@ class Screening {
   Result<AlignedBlocks> aligned(BlockSeries series) {
     const Result<void> valid =
         check(noise_).and_then([&] { return check_travel(series, options_); });
-    if (!valid) {
-      return tl::unexpected(valid.error());
-    }
+    ABBE_TRY(valid);
 
     Result<Alignment> alignment = align(series, machine_, path_, options_);
     options_.progress = {};  // the first alignment has reported it
-    if (!alignment) {
-      return tl::unexpected(alignment.error());
-    }
+    ABBE_TRY(alignment);
     return AlignedBlocks{std::move(series), *std::move(alignment)};
   }
 
@@ -184,9 +181,7 @@ Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples
                                      const Machine& machine, const Path& path, const Noise& noise,
                                      const Options& options) {
   Result<NestVisits> nests = find_nest_visits(samples, options.nests, noise);
-  if (!nests) {
-    return tl::unexpected(nests.error());
-  }
+  ABBE_TRY(nests);
   const auto with_notes = [&](Error error) {
     if (!nests->found.empty()) {
       error.text += "; " + taken_out_text(*nests);

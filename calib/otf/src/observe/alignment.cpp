@@ -8,6 +8,7 @@
 #include "abbe/calib/geometry/axis_mistakes.hpp"
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "run/path_corrections.hpp"
 #include "run/progress.hpp"
 #include "run/range_offset.hpp"
@@ -174,9 +175,7 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
     const std::vector<Vector3> points = axis_positions(series, a.T_machine_tracker, t);
     if (update < options.leg_assignment_updates) {
       Result<std::vector<std::size_t>> leg = assign_legs(points, path, options.leg_direction_m);
-      if (!leg) {
-        return tl::unexpected(leg.error());
-      }
+      ABBE_TRY(leg);
       a.leg = *std::move(leg);
     }
     pairs = pair_up(series, points, a.leg, path, t, options.corner_m);
@@ -209,25 +208,17 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
 
 Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machine,
                                  const Path& path, const Options& options) {
-  if (Result<void> valid = check(series, path); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(series, path));
 
   const Vector3& t = machine.target_offset_m;
   const Centroid measured = centroid(measured_polyline(series));
   const Centroid nominal = centroid(path.vertices_m);
   const Result<RigidTransform> first = rough(series, measured, path, nominal, t);
 
-  if (!first) {
-    return tl::unexpected(first.error());
-  }
+  ABBE_TRY(first);
 
-  if (Result<void> valid =
-          check_length(measured.length_m, travel_in_breaks_m(series, measured.length_m),
-                       nominal.length_m, options.max_length_mismatch);
-      !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_length(measured.length_m, travel_in_breaks_m(series, measured.length_m),
+                        nominal.length_m, options.max_length_mismatch));
 
   Alignment a;
   a.rough_T_machine_tracker = a.T_machine_tracker = *first;
@@ -240,9 +231,7 @@ Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machi
     valid = check_fit(a, pairs, series, path, t, options);
   }
 
-  if (!valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(valid);
 
   a.used = std::move(pairs.used);
   return a;

@@ -5,6 +5,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/statistics/median.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -194,9 +195,7 @@ Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
 
 Result<BlockSeries> make_blocks(std::span<const TrackerObservation> samples,
                                 const Options& options) {
-  if (Result<void> valid = check(samples, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(samples, options));
 
   const Result<Vector3> start =
       standstill(samples.begin(), samples.end(), options.standstill_samples);

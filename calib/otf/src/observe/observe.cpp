@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/statistics/median.hpp"
 #include "abbe/calib/otf/observe/known_travel.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/observe_aligned.hpp"
 #include "observe/rigid_columns.hpp"
 #include "observe/run_times.hpp"
@@ -240,9 +241,7 @@ Result<Observations> observations_without_rows(const Machine& machine, const Pat
       ParameterLayout::observable_with_one_target(machine.chain, machine.nodes)
           .and_then(
               [&](ParameterLayout layout) { return TableBasis::of(std::move(layout), tables); });
-  if (!basis) {
-    return tl::unexpected(basis.error());
-  }
+  ABBE_TRY(basis);
 
   return Observations{.basis = *std::move(basis),
                       .target_offset_m = machine.target_offset_m,
@@ -300,9 +299,7 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   if (valid) {
     valid = check_travel(series, options);
   }
-  if (!valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(valid);
 
   return align(series, machine, path, options).and_then([&](Alignment alignment) {
     return observe_aligned(series, std::move(alignment), machine, path, noise, options);
@@ -320,9 +317,7 @@ Result<Observations> observe_aligned(const BlockSeries& series, Alignment alignm
 
   Observations o = *std::move(empty);
   const Result<std::size_t> first_leg = first_with_backlash(o);
-  if (!first_leg) {
-    return tl::unexpected(first_leg.error());
-  }
+  ABBE_TRY(first_leg);
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();
@@ -343,9 +338,7 @@ Result<Observations> observe_aligned(const BlockSeries& series, Alignment alignm
     if ((i + 1) % 1000 == 0) {
       report(options, Stage::Observe,
              static_cast<double>(i + 1) / static_cast<double>(series.blocks.size()));
-      if (Result<void> running = check_stopped(options.stopped); !running) {
-        return tl::unexpected(running.error());
-      }
+      ABBE_TRY(check_stopped(options.stopped));
     }
   }
 

@@ -8,6 +8,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/otf/plan/plan_observable.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
+#include "abbe/result/try.hpp"
 #include "plan/plan_descent.hpp"
 #include "plan/plan_exchange.hpp"
 #include "plan/plan_lattice.hpp"
@@ -136,18 +137,14 @@ Result<PlannedPath> plan(const PlannedRun& run, const PathBudget& budget,
   const MachineNodes& nodes = run.machine.nodes;
   const std::vector<Vector3> lattice = plan_lattice(nodes, options.lattice);
   Result<Path> path = walk(problem, lattice, budget, options);
-  if (!path) {
-    return tl::unexpected(path.error());
-  }
+  ABBE_TRY(path);
 
   *path = reach_corners(problem, *std::move(path), budget);
   const double walk_value = problem.state_of(*path).value_m2;
   if (options.exchanges > 0) {
     path = improved(problem, *std::move(path), lattice, budget, options);
   }
-  if (!path) {
-    return tl::unexpected(path.error());
-  }
+  ABBE_TRY(path);
 
   *path = rounded(*std::move(path), nodes);
   if (!is_sufficient(*path, run)) {

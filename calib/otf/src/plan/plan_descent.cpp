@@ -6,6 +6,7 @@
 
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -167,9 +168,7 @@ Result<Path> descend(const PlanProblem& problem, Path path, const std::vector<bo
   double move_m = kFirst_m;
 
   for (std::size_t i = 0; i < most_steps && move_m >= kLeast_m; ++i) {
-    if (Result<void> running = check_stopped(stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(stopped));
 
     state = problem.with_slope(std::move(state));
     VertexVectors step = descent(problem, state, path);

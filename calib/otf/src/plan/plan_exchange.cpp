@@ -8,6 +8,7 @@
 
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
+#include "abbe/result/try.hpp"
 #include "plan/plan_lattice.hpp"
 
 namespace abbe::calib::otf {
@@ -303,9 +304,7 @@ Result<Path> exchange_vertices(const PlanProblem& problem, Path path,
     std::vector<Exchange> done;
 
     for (std::size_t i = 0; i < found.size() && evaluated < most && done.size() < kAccepted; ++i) {
-      if (Result<void> running = check_stopped(options.stopped); !running) {
-        return tl::unexpected(running.error());
-      }
+      ABBE_TRY(check_stopped(options.stopped));
       Exchange e = found[i];
       if (!std::all_of(done.begin(), done.end(), [&](const Exchange& d) { return adapt(e, d); }) ||
           !failed.insert(key_of(path, e)).second) {

@@ -11,6 +11,7 @@
 #include "abbe/calib/model/gauge.hpp"
 #include "abbe/calib/otf/observe/blocks.hpp"
 #include "abbe/calib/otf/solve/solve.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/gauge_of.hpp"
 
 namespace abbe::calib::otf {
@@ -128,15 +129,11 @@ Result<Observability> observability(const Path& path, const Machine& machine,
   Machine linear = machine;  // the rank hardly depends on the interpolation, the time does
   linear.interpolation = Interpolation::Linear;
   Result<Observations> empty = observations_without_rows(linear, path, {}, {}, backlash);
-  if (!empty) {
-    return tl::unexpected(empty.error());
-  }
+  ABBE_TRY(empty);
 
   Observations o = *std::move(empty);
   const Result<std::size_t> first = first_with_backlash(o);
-  if (!first) {
-    return tl::unexpected(first.error());
-  }
+  ABBE_TRY(first);
 
   const auto conditions = static_cast<std::size_t>(gauge_of(o).conditions().rows());
   Observability result{.needed = o.unknowns() - conditions, .unused = note_on_unused(o)};
@@ -162,9 +159,7 @@ Result<Observability> observability(const Path& path, const Machine& machine,
 
 Result<void> check_observable(const Path& path, const Machine& machine, TravelDependence backlash) {
   const Result<Observability> seen = observability(path, machine, backlash);
-  if (!seen) {
-    return tl::unexpected(seen.error());
-  }
+  ABBE_TRY(seen);
   if (seen->undetermined.empty()) {
     return {};
   }

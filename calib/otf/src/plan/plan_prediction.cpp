@@ -9,6 +9,7 @@
 #include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/calib/otf/solve/backlash.hpp"
 #include "abbe/calib/otf/solve/solve.hpp"
+#include "abbe/result/try.hpp"
 #include "plan/plan_rows.hpp"
 #include "plan/plan_volume.hpp"
 #include "solve/systematic_effects.hpp"
@@ -124,18 +125,12 @@ Eigen::MatrixXd covariance_of(const Observations& o, const Adjustment& a) {
 }  // namespace
 
 Result<Prediction> predict(const Path& path, const PlannedRun& run, std::size_t row_points) {
-  if (Result<void> valid = check_all(path, run); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_all(path, run));
 
   const Result<Observations> o = planned_observations(path, run, row_points);
-  if (!o) {
-    return tl::unexpected(o.error());
-  }
+  ABBE_TRY(o);
   const Result<Adjustment> a = adjust(information_of(*o), *o);
-  if (!a) {
-    return tl::unexpected(a.error());
-  }
+  ABBE_TRY(a);
 
   const Eigen::MatrixXd covariance = covariance_of(*o, *a);
   const RigidFreeVolume volume(o->layout(), run.machine.target_offset_m);

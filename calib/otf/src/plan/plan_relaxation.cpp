@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "abbe/calib/internal/base/check_stopped.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -78,9 +79,7 @@ Result<RelaxedDesign> relaxed_design(const PlanProblem& problem, std::span<const
   PathState state = problem.state_of(Eigen::MatrixXd(problem.prior() + H));
 
   for (int i = 0; i < kSteps; ++i) {
-    if (Result<void> running = check_stopped(stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(stopped));
     state = problem.with_slope(std::move(state));
     reweight(problem, state, length_m, least, legs);
     H = information_of_legs(problem, legs);

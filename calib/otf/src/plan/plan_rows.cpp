@@ -6,6 +6,7 @@
 
 #include "abbe/calib/otf/observe/blocks.hpp"
 #include "abbe/calib/otf/observe/known_travel.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -124,9 +125,7 @@ Result<Observations> planned_observations(const Path& path, const PlannedRun& ru
   o.alignment.T_machine_tracker.t_m = run.tracker_m;
   o.u_range_offset_m = run.noise.u_range_offset_m;
   const Result<std::size_t> first = first_with_backlash(o);
-  if (!first) {
-    return tl::unexpected(first.error());
-  }
+  ABBE_TRY(first);
   for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
     const Vector3 leg = path.vertices_m[i + 1] - path.vertices_m[i];
     append_leg(o, {i, path.vertices_m[i], leg.normalized(), leg.norm(), i >= *first}, run,

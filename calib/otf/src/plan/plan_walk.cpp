@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abbe/calib/internal/base/check_stopped.hpp"
+#include "abbe/result/try.hpp"
 #include "plan/plan_lattice.hpp"
 
 namespace abbe::calib::otf {
@@ -85,9 +86,7 @@ Result<Path> greedy_walk(const PlanProblem& problem, std::span<const Vector3> la
   double driven_m = 0.0;
 
   while (true) {
-    if (Result<void> running = check_stopped(stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(stopped));
 
     const double left_m = std::max(whole_m - driven_m, 0.0);
     const double most_m =

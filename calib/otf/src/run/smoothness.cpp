@@ -10,6 +10,7 @@
 #include "abbe/calib/internal/otf/run/about_bends.hpp"
 #include "abbe/calib/internal/statistics/chi2_tail.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -229,9 +230,7 @@ Result<Smoothness> permitted_smoothness(
   Smoothness s = smoothness_for(data, basis, options, first_factor);
   for (int round = 1;; ++round) {
     const Result<double> factor = factor_with(s);
-    if (!factor) {
-      return tl::unexpected(factor.error());
-    }
+    ABBE_TRY(factor);
     Smoothness next = smoothness_for(data, basis, options, *factor);
     if (is_same(next, s) || round == kMostRounds) {
       return s;

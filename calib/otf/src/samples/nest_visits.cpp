@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "samples/nest_stands.hpp"
 
 namespace abbe::calib::otf {
@@ -147,9 +148,7 @@ Result<NestVisits> find_nest_visits(std::span<const TrackerObservation> samples,
   if (options.nests.empty()) {
     return visits;
   }
-  if (Result<void> valid = check_nests(options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_nests(options));
 
   std::vector<std::size_t> too_short(options.nests.size(), 0), of_machine = too_short;
   for (const Nest& nest : options.nests) {

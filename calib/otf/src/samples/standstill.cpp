@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "samples/sample_windows.hpp"
 #include "samples/standstill_statistics.hpp"
 
@@ -204,9 +205,7 @@ std::string means_text(double period_s, double least_duration_s) {
 
 Result<Standstills> find_standstills(std::span<const TrackerObservation> samples,
                                      const StandstillOptions& options) {
-  if (Result<void> valid = check_samples(samples); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_samples(samples));
 
   const SpeedTest test(samples, options);
   const std::vector<double>& time_s = test.times().time_s;

@@ -10,6 +10,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/otf/solve/prewhitening.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/gauge_of.hpp"
 #include "solve/noise_whitening.hpp"
 #include "solve/priors.hpp"
@@ -365,9 +366,7 @@ Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const doubl
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(best.x.size());
 
   for (int round = 0; round < kMostRounds; ++round) {
-    if (Result<void> running = check_stopped(options.stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(options.stopped));
     const double white_factor = best.value.white_factor;
     const AboutUnknowns::Fit at = unknowns.fit(scales.noise(best.x), white_factor);
     for (Eigen::Index k = 0; round < kRoundsWithSlope && k < slope.size(); ++k) {

@@ -7,6 +7,7 @@
 
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/change_in_u.hpp"
 #include "solve/gauge_of.hpp"
 #include "solve/priors.hpp"
@@ -118,9 +119,7 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
   Eigen::VectorXd at;
   double change = 0.0;
   for (int adjustments = 1; adjustments <= options.max_adjustments; ++adjustments) {
-    if (Result<void> running = check_stopped(options.stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(options.stopped));
 
     if (along != nullptr) {
       with_along = along->added_to(o, series, noise);
@@ -132,9 +131,7 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
     const Result<Eigen::VectorXd> U = gauge_of(rows).estimate(
         with_priors(information.data, rows),
         {.weight = options.gauge_weight, .label = [&](std::size_t i) { return rows.label(i); }});
-    if (!U) {
-      return tl::unexpected(U.error());
-    }
+    ABBE_TRY(U);
 
     change = change_in_u(*U - at, information.data);
     if (change < options.adjustment_tolerance) {

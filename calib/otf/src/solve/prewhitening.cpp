@@ -11,6 +11,7 @@
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
 #include "abbe/calib/internal/statistics/quantile_999.hpp"
 #include "abbe/calib/otf/solve/residual_noise.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/systematic_effects.hpp"
 #include "solve/whitened_rows.hpp"
 #include "solve/with_drift.hpp"
@@ -67,14 +68,10 @@ struct Whitened {
 
 Result<Whitened> adjust_whitened(const Observations& o, const WhitenedRows& rows,
                                  const Options& options) {
-  if (Result<void> running = check_stopped(options.stopped); !running) {
-    return tl::unexpected(running.error());
-  }
+  ABBE_TRY(check_stopped(options.stopped));
 
   const Result<Adjustment> a = adjust(information_of(o, rows), o, options.gauge_weight);
-  if (!a) {
-    return tl::unexpected(a.error());
-  }
+  ABBE_TRY(a);
 
   const std::size_t dof = o.rows.size() - a->rank;
   const auto factor = [&](std::span<const double> residual_m) {
@@ -88,9 +85,7 @@ Result<Whitened> adjust_whitened(const Observations& o, const WhitenedRows& rows
 
   if (o.drift) {
     Result<WithDrift> with = with_drift(o, rows, *a, w.residual_m, factor, options.stopped);
-    if (!with) {
-      return tl::unexpected(with.error());
-    }
+    ABBE_TRY(with);
     drift = *std::move(with);
     w.U = std::move(drift->U);
     w.residual_m = std::move(drift->residual_m);
@@ -137,22 +132,16 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
   }
 
   const Result<TrackerNoise> noise = estimate_noise(o, s.residuals.after_m, options);
-  if (!noise) {
-    return tl::unexpected(noise.error());
-  }
+  ABBE_TRY(noise);
 
   const WhitenedRows rows(o, *noise);
   Result<Whitened> w =
       adjust_whitened(with_variance_factor(o, rows.variance_factor()), rows, options);
-  if (!w) {
-    return tl::unexpected(w.error());
-  }
+  ABBE_TRY(w);
 
   Result<VolumetricModel> model =
       model_of(o, std::array{o.target_offset_m}, w->U, w->covariance, s.model.validity());
-  if (!model) {
-    return tl::unexpected(model.error());
-  }
+  ABBE_TRY(model);
 
   s.model = *std::move(model);
   s.rigid = w->U.segment<kRigidUnknowns>(static_cast<Eigen::Index>(o.rigid_offset()));

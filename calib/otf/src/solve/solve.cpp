@@ -12,6 +12,7 @@
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
 #include "abbe/calib/otf/solve/residual_noise.hpp"
+#include "abbe/result/try.hpp"
 #include "run/progress.hpp"
 #include "solve/find_misfit.hpp"
 #include "solve/run_statistics.hpp"
@@ -121,32 +122,22 @@ double chi2(const Observations& o, std::span<const double> r) {
 }
 
 Result<Solution> solve(const Observations& o, const Options& options) {
-  if (Result<void> enough = check_enough(o); !enough) {
-    return tl::unexpected(enough.error());
-  }
+  ABBE_TRY(check_enough(o));
   report(options, Stage::Solve, 0.0);
   return solve(o, information_of(o), options);
 }
 
 Result<Solution> solve(const Observations& o, const RowInformation& rows, const Options& options) {
-  if (Result<void> enough = check_enough(o); !enough) {
-    return tl::unexpected(enough.error());
-  }
+  ABBE_TRY(check_enough(o));
 
   report(options, Stage::Solve, 0.5);
-  if (Result<void> running = check_stopped(options.stopped); !running) {
-    return tl::unexpected(running.error());
-  }
+  ABBE_TRY(check_stopped(options.stopped));
 
   Result<Adjustment> a = adjust(rows, o, options.gauge_weight);
-  if (!a) {
-    return tl::unexpected(a.error());
-  }
+  ABBE_TRY(a);
 
   Result<ValidityVolume> validity = ValidityVolume::hull_of(o.covered_m);
-  if (!validity) {
-    return tl::unexpected(validity.error());
-  }
+  ABBE_TRY(validity);
 
   const Adjustment of_rows = *a;
   const WhitenedRows as_observed(o);
@@ -165,9 +156,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
     };
     Result<WithDrift> with =
         with_drift(o, as_observed, *a, residuals.after_m, variance, options.stopped);
-    if (!with) {
-      return tl::unexpected(with.error());
-    }
+    ABBE_TRY(with);
     drift = *std::move(with);
     offset = drift->offset;
     a->U = std::move(drift->U);
@@ -198,9 +187,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   Result<VolumetricModel> model =
       model_of(o, std::array{o.target_offset_m}, a->U, a->covariance, *std::move(validity));
 
-  if (!model) {
-    return tl::unexpected(model.error());
-  }
+  ABBE_TRY(model);
 
   report(options, Stage::Solve, 1.0);
   return Solution{
@@ -240,9 +227,7 @@ Result<Solution> with_misfit(Solution s, Observations& o) {
           .and_then([&](const VolumetricModel& of_tables) {
             return of_tables.with_misfit(std::move(found->misfit));
           });
-  if (!model) {
-    return tl::unexpected(model.error());
-  }
+  ABBE_TRY(model);
   if (!is_notable_misfit(*model)) {
     return s;
   }

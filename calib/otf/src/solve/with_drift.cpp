@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
+#include "abbe/result/try.hpp"
 #include "solve/drift_columns.hpp"
 #include "solve/systematic_effects.hpp"
 
@@ -125,9 +126,7 @@ Result<WithDrift> with_drift(const Observations& o, const WhitenedRows& rows, co
     equations.S = reduced.S / factor;
     equations.g = reduced.g / factor;
     Result<DriftEstimate> found = estimate_drift(*o.drift, equations, stopped);
-    if (!found) {
-      return tl::unexpected(found.error());
-    }
+    ABBE_TRY(found);
     estimate = *std::move(found);
     with.U = a.U - reduced.dU_dd * estimate.d;
     with.residual_m = residuals_with_drift_m(o, columns, with.U, estimate.d);

@@ -9,6 +9,7 @@
 #include "abbe/calib/internal/statistics/quantile_999.hpp"
 #include "abbe/calib/otf/observe/known_travel.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
+#include "abbe/result/try.hpp"
 #include "observe/run_times.hpp"
 #include "run/progress.hpp"
 
@@ -140,14 +141,10 @@ std::vector<Vector3> u_of_means_m(const Standstills& all, const Noise& noise,
 Result<Observations> observe_standstills(const Standstills& all, const Machine& machine,
                                          const Path& path, const Noise& noise,
                                          const Options& options) {
-  if (Result<void> valid = check(noise); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check(noise));
 
   const Result<StandstillAssignment> a = assign_standstills(all.found, machine, path, options);
-  if (!a) {
-    return tl::unexpected(a.error());
-  }
+  ABBE_TRY(a);
 
   Result<Observations> empty = observations_without_rows(
       machine, path, noise, alignment_of(*a, all, path), options.backlash);
@@ -166,9 +163,7 @@ Result<Observations> observe_standstills(const Standstills& all, const Machine& 
   note_noise(o.notes, all, noise);
   const std::vector<Vector3> u_m = u_of_means_m(all, noise, options.standstill.u_repeatability_m);
   const Result<std::size_t> first = first_with_backlash(o);
-  if (!first) {
-    return tl::unexpected(first.error());
-  }
+  ABBE_TRY(first);
 
   for (std::size_t j = *first; j < a->standstill_of.size(); ++j) {
     if (const auto i = a->standstill_of[j]) {

@@ -7,6 +7,7 @@
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
+#include "abbe/result/try.hpp"
 #include "run/match_in_order.hpp"
 #include "run/path_corrections.hpp"
 #include "run/range_offset.hpp"
@@ -135,9 +136,7 @@ Result<std::optional<Hypothesis>> first_hypothesis(const Problem& p, const Optio
         return best;
       }
     }
-    if (Result<void> running = check_stopped(options.stopped); !running) {
-      return tl::unexpected(running.error());
-    }
+    ABBE_TRY(check_stopped(options.stopped));
   }
 
   return best;
@@ -295,9 +294,7 @@ Result<StandstillAssignment> assign_as_given(std::span<const Standstill> standst
                                              const Options& options) {
   const Problem p = problem_of(standstills, machine, path);
   Result<std::optional<Hypothesis>> h = first_hypothesis(p, options);
-  if (!h) {
-    return tl::unexpected(h.error());
-  }
+  ABBE_TRY(h);
 
   if (!*h) {
     return failure(
@@ -309,16 +306,12 @@ Result<StandstillAssignment> assign_as_given(std::span<const Standstill> standst
   const RigidTransform rough = (*h)->T_machine_tracker;
   const double tolerance_m = options.max_alignment_distance_m;
   const Result<int> updates = refine(**h, p, tolerance_m);
-  if (!updates) {
-    return tl::unexpected(updates.error());
-  }
+  ABBE_TRY(updates);
 
   StandstillAssignment a = assignment_of(**h, p, tolerance_m);
   a.rough_T_machine_tracker = rough;
   a.iterations = *updates;
-  if (Result<void> valid = check_assignment(a, p, path, options); !valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(check_assignment(a, p, path, options));
   return a;
 }
 
@@ -366,9 +359,7 @@ Result<StandstillAssignment> assign_standstills(std::span<const Standstill> stan
   if (valid) {
     valid = check_size(standstills.size(), path.vertices_m.size());
   }
-  if (!valid) {
-    return tl::unexpected(valid.error());
-  }
+  ABBE_TRY(valid);
 
   Result<StandstillAssignment> a = assign_as_given(standstills, machine, path, options);
   if (!a && a.error().code == ErrorCode::AlignmentFailed) {

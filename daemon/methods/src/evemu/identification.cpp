@@ -8,6 +8,7 @@
 #include "abbe/config/calibration_input.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "usable_touch.hpp"
 
@@ -77,7 +78,7 @@ Result<void> check_size(const EvemuRequest& request) {
 }
 
 Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
-  if (auto fits = check_size(request); !fits) return fits;
+  ABBE_TRY(check_size(request));
   const auto touches = touch_source(config);
   if (!touches) {
     return fail(ErrorCode::Refused,
@@ -96,9 +97,8 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
             touches->key));
   }
 
-  if (const auto given = require_target(config.machine); !given) return given;
-  if (const auto machine = evemu_machine(config.machine); !machine)
-    return tl::unexpected(machine.error());
+  ABBE_TRY(require_target(config.machine));
+  ABBE_TRY(evemu_machine(config.machine));
   const auto& artefact = config.evemu.artefact;
   const auto fault = artefact_temperature_fault(
       request.calibrator, fmt::format("calibrator \"{}\"", request.calibrator.name),
@@ -117,7 +117,7 @@ Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& confi
                                         const calib::VolumetricModel* active,
                                         const std::function<bool()>& stopped) {
   const auto machine = evemu_machine(config.machine);
-  if (!machine) return tl::unexpected(machine.error());
+  ABBE_TRY(machine);
 
   evemu::ObserveOptions observing;
   observing.order = config.evemu.order;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "abbe/config/calib_error.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "usable_touch.hpp"
 
@@ -37,16 +38,15 @@ Result<void> take_earlier(mfb::TouchGuide& guide, const std::vector<calib::Vecto
 
 Result<MfbAcquisition> MfbAcquisition::create(const MfbRequest& request,
                                               MfbAcquisitionOptions options) {
-  if (!options.machine) return tl::unexpected(options.machine.error());
+  ABBE_TRY(options.machine);
   auto bar = parse_bar_toml(request.bar.text, request.bar.name);
-  if (!bar) return tl::unexpected(bar.error());
+  ABBE_TRY(bar);
   auto plan = parse_bar_plan_toml(request.plan.text, request.plan.name, bar->bar);
-  if (!plan) return tl::unexpected(plan.error());
+  ABBE_TRY(plan);
   auto guide = mfb::TouchGuide::create(bar->bar, std::move(plan->plan), *options.machine);
   if (!guide)
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", request.plan.name, guide.error().text));
-  if (const auto taken = take_earlier(*guide, request.earlier_m); !taken)
-    return tl::unexpected(taken.error());
+  ABBE_TRY(take_earlier(*guide, request.earlier_m));
   return MfbAcquisition{
       std::move(bar->bar), {bar->source, plan->source}, *std::move(guide), std::move(options)};
 }

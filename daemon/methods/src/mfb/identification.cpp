@@ -7,6 +7,7 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -19,7 +20,7 @@ Result<MfbCandidate> identify_with_bar(const MfbTask& task, const Config& config
     if (progress) progress(step, share);
   };
   const auto machine = mfb_machine(config.machine);
-  if (!machine) return tl::unexpected(machine.error());
+  ABBE_TRY(machine);
 
   show("identifying", 0.0);
   auto found = mfb::identify(task.bar, task.plan, task.passes, *machine, task.options);

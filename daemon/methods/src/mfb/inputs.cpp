@@ -7,6 +7,7 @@
 #include <span>
 
 #include "abbe/config/calibration_input.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -57,7 +58,7 @@ void add_notes_on_bar(const mfb::Bar& bar, std::span<const mfb::Measurement> mea
 Result<calib::mfb::MfbMachine> mfb_machine(const MachineConfig& machine) {
   using calib::Interpolation;
   auto described = otf_machine(machine);
-  if (!described) return tl::unexpected(described.error());
+  ABBE_TRY(described);
   const bool linear = machine.interpolation == TableInterpolation::Linear;
   return calib::mfb::MfbMachine{described->chain, std::move(described->nodes),
                                 linear ? Interpolation::Linear : Interpolation::NotAKnotCubic};

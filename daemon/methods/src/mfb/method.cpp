@@ -14,6 +14,7 @@
 #include "abbe/config/json_vector.hpp"
 #include "abbe/methods/mfb/document.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "usable_touch.hpp"
 
@@ -66,9 +67,9 @@ Result<void> check_source_of_touches(const Config& config) {
 /// The plan must show all 21 errors.
 Result<void> check_plan(const MfbRequest& request, const mfb::MfbMachine& machine) {
   const auto bar = parse_bar_toml(request.bar.text, request.bar.name);
-  if (!bar) return tl::unexpected(bar.error());
+  ABBE_TRY(bar);
   const auto plan = parse_bar_plan_toml(request.plan.text, request.plan.name, bar->bar);
-  if (!plan) return tl::unexpected(plan.error());
+  ABBE_TRY(plan);
   const auto predicted = mfb::predict(bar->bar, plan->plan, machine);
   if (!predicted)
     return fail(ErrorCode::BadInput,
@@ -126,10 +127,10 @@ MfbMethod::Request MfbMethod::request_from(const json& object, const Config* /*c
 }
 
 Result<void> MfbMethod::check(const Request& request, const Config& config) {
-  if (auto small = check_size(request); !small) return small;
-  if (auto given = check_source_of_touches(config); !given) return given;
+  ABBE_TRY(check_size(request));
+  ABBE_TRY(check_source_of_touches(config));
   const auto machine = mfb_machine(config.machine);
-  if (!machine) return tl::unexpected(machine.error());
+  ABBE_TRY(machine);
   return check_plan(request, *machine);
 }
 

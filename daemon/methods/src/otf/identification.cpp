@@ -9,6 +9,7 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -34,7 +35,7 @@ Result<IdentifiedRun> identify_observations(const OtfRun& run, const Config& con
                                             const calib::VolumetricModel* active,
                                             const IdentificationWatch& watch) {
   const auto machine = otf_machine(config.machine);
-  if (!machine) return tl::unexpected(machine.error());
+  ABBE_TRY(machine);
   const auto points = otf_observations(run.points);
   calib::otf::Options options = otf_options(points, config);
   options.mode = run.mode;
@@ -68,7 +69,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
                                   const calib::VolumetricModel* active,
                                   const IdentificationWatch& watch) {
   auto identified = identify_observations(run, config, active, watch);
-  if (!identified) return tl::unexpected(identified.error());
+  ABBE_TRY(identified);
   return OtfCandidate{std::move(identified->found.solution), std::move(identified->verdict),
                       run.mode, std::move(identified->residuals), run.temperature_K};
 }

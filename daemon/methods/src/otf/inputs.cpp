@@ -16,6 +16,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/stretched.hpp"
 #include "abbe/pipeline/environment_use.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -64,7 +65,7 @@ calib::Result<void> determines_tables(const calib::otf::Path& path,
   if (backlash == calib::TravelDependence::None) return {};
   const auto first =
       calib::otf::first_with_known_travel(calib::otf::travel_along(path.vertices_m, mode));
-  if (!first) return tl::unexpected(first.error());
+  ABBE_TRY(first);
   return {};
 }
 
@@ -72,9 +73,9 @@ calib::Result<void> determines_tables(const calib::otf::Path& path,
 
 Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine,
                             calib::otf::Mode mode, calib::TravelDependence backlash) {
-  if (auto given = require_target(machine); !given) return given;
+  ABBE_TRY(require_target(machine));
   const auto known = otf_machine(machine);
-  if (!known) return tl::unexpected(known.error());
+  ABBE_TRY(known);
   const calib::otf::Path path = otf_path(path_m);
   auto valid = calib::otf::check(path, known->nodes);
   if (valid) valid = determines_tables(path, *known, mode, backlash);

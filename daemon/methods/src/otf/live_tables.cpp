@@ -12,6 +12,7 @@
 #include "abbe/config/calibration_input.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/environment_use.hpp"
+#include "abbe/result/try.hpp"
 #include "otf/vector_of.hpp"
 
 namespace abbe::daemon {
@@ -48,7 +49,7 @@ LiveTables live_tables(const calib::otf::TablesSoFar& found, const calib::Machin
 
 Result<OtfLiveTables> OtfLiveTables::of(const Config& config) {
   auto machine = otf_machine(config.machine);
-  if (!machine) return tl::unexpected(machine.error());
+  ABBE_TRY(machine);
   auto estimate = calib::otf::RunningEstimate::of({.machine = *machine,
                                                    .noise = otf_noise(config.machine),
                                                    .backlash = calib_of(config.otf.backlash)});

@@ -8,9 +8,9 @@
 ///     const auto model = read_model(file);
 ///     ABBE_TRY(model);
 /// The error is returned as it is, so that the message names what was read, not who read it.
-#define ABBE_TRY(...)                                                      \
-  do {                                                                     \
-    if (auto&& abbe_tried = (__VA_ARGS__); !abbe_tried) {                  \
-      return tl::make_unexpected(abbe_tried.error());                      \
-    }                                                                      \
+#define ABBE_TRY(...)                                     \
+  do {                                                    \
+    if (auto&& abbe_tried = (__VA_ARGS__); !abbe_tried) { \
+      return tl::make_unexpected(abbe_tried.error());     \
+    }                                                     \
   } while (false)

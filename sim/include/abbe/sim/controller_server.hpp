@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/result/try.hpp"
 #include "abbe/sim/error.hpp"
 #include "abbe/sim/sim_clock.hpp"
 #include "abbe/sim/socket.hpp"
@@ -25,7 +26,7 @@ class ControllerServer {
   [[nodiscard]] static Result<ControllerServer> open(std::uint16_t port,
                                                      std::unique_ptr<Controller> controller) {
     auto listener = listen_tcp(port);
-    if (!listener) return tl::unexpected(listener.error());
+    ABBE_TRY(listener);
     return ControllerServer(std::move(*listener), std::move(controller));
   }
 

@@ -81,7 +81,33 @@ double group_m(const Observations& o) {
              : 0.0;
 }
 
-/// log |A^T V^-1 A| and the generalised least squares solution, from the grouped rows.
+/// Replaces every row w of W by w R^-1, R upper triangular.
+void solve_from_right(const RowMatrix& R, RowMatrix& W) {
+  for (Eigen::Index at = 0; at < W.rows(); ++at) {
+    double* const w = W.row(at).data();
+    for (Eigen::Index i = 0; i < R.rows(); ++i) {
+      const double* const r = R.row(i).data();
+      w[i] /= r[i];
+      const double solved = w[i];
+      for (Eigen::Index j = i + 1; j < R.cols(); ++j) {
+        w[j] -= solved * r[j];
+      }
+    }
+  }
+}
+
+double squares(const RowMatrix& rows) {
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    for (Eigen::Index j = 0; j < rows.cols(); ++j) {
+      sum += rows(i, j) * rows(i, j);
+    }
+  }
+  return sum;
+}
+
+/// Slope of log |A^T V^-1 A|, priors included, and the generalised least squares solution, from the
+/// grouped rows.
 class AboutUnknowns {
  public:
   AboutUnknowns(const Observations& o, const NoiseSeries& series,
@@ -102,8 +128,9 @@ class AboutUnknowns {
     K_ = (K_ * scale_.asDiagonal()).rowwise().normalized();
   }
 
+  /// Of N = A^T V^-1 A + priors + K^T K = R^T R, unknowns in units of scale_.
   struct Fit {
-    double log_determinant = 0.0;
+    Eigen::MatrixXd R;
     Eigen::VectorXd U;
   };
   /// `white_factor`: with which the prior for smooth tables is weighted.
@@ -118,14 +145,35 @@ class AboutUnknowns {
     estimation::Information bordered(o_.unknowns());
     bordered.add_rows(data.R() * scale_.asDiagonal(), data.z());
     bordered.add_rows(K_, Eigen::VectorXd::Zero(K_.rows()));
-    const Eigen::MatrixXd T = bordered.R();
     Fit found;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      found.log_determinant += 2.0 * natural_logarithm(T(i, i));
-    }
-    found.U =
-        scale_.asDiagonal() * Eigen::VectorXd(T.triangularView<Eigen::Upper>().solve(bordered.z()));
+    found.R = bordered.R();
+    found.U = scale_.asDiagonal() *
+              Eigen::VectorXd(found.R.triangularView<Eigen::Upper>().solve(bordered.z()));
     return found;
+  }
+
+  /// Slope of log |N| at the noise x of a fit. Priors and K do not depend on x. With A = W R and
+  /// V = L L^T,
+  ///     d log |N| = tr(R^-T d(A^T V^-1 A) R^-1) = d |L^-1 W|^2,   |.|^2: sum of squares
+  [[nodiscard]] Eigen::VectorXd slope(const Fit& at, const Scales& scales,
+                                      const Parameters& x) const {
+    constexpr double kStep = 1e-4;  // of a logarithm
+    RowMatrix W = rows_.leftCols(scale_.size()) * scale_.asDiagonal();
+    solve_from_right(at.R, W);
+    const auto squares_at = [&](const Parameters& noise) {
+      RowMatrix whitened = W;
+      NoiseWhitening(groups_.series, scales.noise(noise)).apply(whitened);
+      return squares(whitened);
+    };
+
+    const double at_x = squares_at(x);
+    Eigen::VectorXd slope(x.size());
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+      Parameters moved = x;
+      moved(k) += kStep;
+      slope(k) = (squares_at(moved) - at_x) / kStep;
+    }
+    return slope;
   }
 
   [[nodiscard]] const GroupedSeries& groups() const { return groups_; }
@@ -343,7 +391,6 @@ Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const doubl
   // longer change x, the slope of -2 log of the restricted likelihood is zero. After the second
   // round the slope hardly changes, and only U is computed again.
   constexpr int kMostRounds = 4, kRoundsWithSlope = 2;
-  constexpr double kStep = 0.1;  // of a logarithm
   // Square of a third of the standard deviation of x; the next round would change x by less than a
   // tenth of that.
   constexpr double kConverged = 0.1;
@@ -369,12 +416,8 @@ Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const doubl
     ABBE_TRY(check_stopped(options.stopped));
     const double white_factor = best.value.white_factor;
     const AboutUnknowns::Fit at = unknowns.fit(scales.noise(best.x), white_factor);
-    for (Eigen::Index k = 0; round < kRoundsWithSlope && k < slope.size(); ++k) {
-      Parameters moved = best.x;
-      moved(k) += kStep;
-      slope(k) =
-          (unknowns.fit(scales.noise(moved), white_factor).log_determinant - at.log_determinant) /
-          kStep;
+    if (round < kRoundsWithSlope) {
+      slope = unknowns.slope(at, scales, best.x);
     }
     likelihood.set_slope(slope);
     likelihood.set_residual(without(o, residual_m, at.U));

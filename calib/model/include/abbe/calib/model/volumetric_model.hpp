@@ -123,8 +123,8 @@ class VolumetricModel {
   /// half of them: half_differences() times its transpose. BadInput for polynomials, wrong sizes,
   /// or a covariance, with that of the tables, not positive semidefinite; NotFinite for NaN.
   [[nodiscard]] Result<VolumetricModel> with_travel(TravelDifferences) const;
-  /// The same model with another misfit; no misfit if !Misfit::any(). BadInput for a wrong size or
-  /// a negative value, NotFinite for NaN.
+  /// The same model with another misfit; none if Misfit::any() is false. BadInput for a wrong size
+  /// or a negative value, NotFinite for NaN.
   [[nodiscard]] Result<VolumetricModel> with_misfit(Misfit) const;
 
   /// V with its covariance. Takes about 1 us, 4 us for cubic tables. No allocation.

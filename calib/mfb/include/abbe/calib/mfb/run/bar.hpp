@@ -74,8 +74,8 @@ struct NominalTouch {
 [[nodiscard]] std::vector<std::size_t> probing_order(const std::vector<NominalTouch>&);
 
 /// The bar as a uniform beam on two supports: deflection w below the line of the supports,
-///     EI w(x) / q = (x-x0)^4/24 - R_a <x-a>^3/6 - R_b <x-b>^3/6 + c1 x + c2,   w(a) = w(b) = 0
-///     <v> = max(v, 0),   R_b = L ((x0+x1)/2 - a)/(b - a),   R_a = L - R_b,   L = x1 - x0
+///     EI w(x) / q = (x-x0)^4/24 - R_a p(x-a)^3/6 - R_b p(x-b)^3/6 + c1 x + c2,   w(a) = w(b) = 0
+///     p(v) = max(v, 0),  R_b = L ((x0+x1)/2 - a)/(b - a),   R_a = L - R_b,   L = x1 - x0
 ///     q/EI = 12 density g / (E h^2),   g = 9.81 m/s^2,   h: size of the section along the bending
 struct Sag {
   std::array<double, 2> beam_x_m{};      ///< ends x0 < x1 of the beam

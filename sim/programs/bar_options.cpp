@@ -96,7 +96,7 @@ Result<void> add_turned(const BarOptions& o, mfb::ProbingOptions& probing) {
 
 void add_bar_options(CLI::App& app, BarOptions& options) {
   app.option_defaults()->always_capture_default();
-  app.add_option("-o,--output", options.folder, "folder for the files; is created")
+  app.add_option("-o,--out", options.folder, "folder for the files; is created")
       ->type_name("FOLDER")
       ->required();
   app.add_option("--seed", options.seed, "seed of everything that is random");

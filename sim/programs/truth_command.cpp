@@ -92,7 +92,7 @@ std::shared_ptr<TruthOptions> add_common(CLI::App& sub) {
   auto options = std::make_shared<TruthOptions>();  // lives as long as the command line's callbacks
   options->choices.needs_path = false;
   add_machine_options(sub, options->choices);
-  sub.add_option("-o,--output", options->out, "default: standard output")->type_name("FILE");
+  sub.add_option("-o,--out", options->out, "default: standard output")->type_name("FILE");
   return options;
 }
 

@@ -162,8 +162,9 @@ TEST_F(WarmArray, IsNamedInEveryResult) {
   ASSERT_EQ(ran.exit, kRefusedByTheGate) << ran.err;
   const auto artefact = nlohmann::json::parse(ran.out)["artefact"];
   EXPECT_NEAR(artefact["temperature_C"].get<double>(), 24.0, 1e-9);
-  EXPECT_NEAR(artefact["growth"].get<double>(), 1.000046, 1e-12);
-  EXPECT_NEAR(artefact["u_growth"].get<double>(), std::hypot(4e-6, 0.5 * kAlpha_per_K), 1e-12);
+  EXPECT_NEAR(artefact["expansion_factor"].get<double>(), 1.000046, 1e-12);
+  EXPECT_NEAR(artefact["u_expansion_factor"].get<double>(), std::hypot(4e-6, 0.5 * kAlpha_per_K),
+              1e-12);
   EXPECT_NEAR(artefact["u_ball_um"].get<double>(), 0.5, 1e-9);
   EXPECT_NEAR(artefact["u_block_urad"].get<double>(), 4.0, 1e-9);
   const auto text = text_of(folder_ / "out/model.json");

@@ -154,6 +154,17 @@ TEST(ModelDocument, ReadsBackWithItsOrigin) {
   EXPECT_EQ(read->statistics, written.statistics);
 }
 
+TEST(ModelDocument, ReadsTheEarlierNameOfTheVarianceFactor) {
+  const auto document = synthetic_document(2);
+  auto text = to_json(document);
+  const std::string name = "\"variance_factor\"";
+  ASSERT_NE(text.find(name), std::string::npos);
+  text.replace(text.find(name), name.size(), "\"covariance_factor\"");
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_EQ(read->statistics, document.statistics);
+}
+
 TEST(ModelDocument, WritesTheSameBytesAgain) {
   const auto text = to_json(synthetic_document(3));
   const auto read = parse_model(text, "model.json");

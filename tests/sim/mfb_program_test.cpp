@@ -86,7 +86,7 @@ TEST_F(MfbProgram, MeasuresTheBarThatWasCalibrated) {
 
 TEST_F(MfbProgram, WrongOptionsAreUsageErrors) {
   const std::pair<const char*, const char*> cases[] = {
-      {"mfb", "--output"},
+      {"mfb", "--out"},
       {"mfb -o out --plan 14", "--plan"},
       {"mfb -o out --drift-um -1", "--drift-um"},
       {"mfb -o out --tip-radius-mm 9", "tip radius"},

@@ -166,7 +166,10 @@ ModelStatistics read_statistics(ModelReader& in) {
   s.condition = in.number_of(*statistics, path, "condition", 0);
   s.sigma0 = in.number_of(*statistics, path, "sigma0", 0);
   s.chi2_per_dof = in.number_of(*statistics, path, "chi2_per_dof", 0);
-  s.variance_factor = in.number_of(*statistics, path, "covariance_factor", 0);
+  // "covariance_factor": the earlier name
+  const bool earlier = statistics->is_object() && statistics->contains("covariance_factor");
+  s.variance_factor =
+      in.number_of(*statistics, path, earlier ? "covariance_factor" : "variance_factor", 0);
   s.before = read_residuals(in, *statistics, "before");
   s.after = read_residuals(in, *statistics, "after");
   s.iterations = static_cast<int>(in.count_of(*statistics, path, "iterations"));

@@ -186,7 +186,7 @@ void write_statistics(JsonText& out, const ModelStatistics& s,
   out.raw(fmt::format(
       "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": "
       "{},\n"
-      "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"covariance_factor\": {},\n"
+      "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"variance_factor\": {},\n"
       "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}{}{}}}",
       s.samples, s.lost_samples, s.observations, s.unknowns, s.rank, to_decimal(s.condition, 0),
       to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.variance_factor, 0),
@@ -329,7 +329,7 @@ void write_artefact(JsonText& out, const calib::Expansion& artefact) {
   out.raw(fmt::format(
       "{{\"temperature_K\": {}, \"u_temperature_K\": {}, \"alpha_um_per_m_K\": {}, "
       "\"u_alpha_um_per_m_K\": {},\n"
-      "    \"growth\": {}, \"u_growth\": {}}}",
+      "    \"expansion_factor\": {}, \"u_expansion_factor\": {}}}",
       to_decimal(artefact.temperature_K, 0), to_decimal(artefact.u_temperature_K, 0),
       to_decimal(artefact.alpha_per_K, kMicroUnit), to_decimal(artefact.u_alpha_per_K, kMicroUnit),
       to_decimal(calib::expansion_factor(artefact), 0),

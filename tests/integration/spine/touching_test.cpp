@@ -74,7 +74,7 @@ struct WholeArray : TouchingRun {
     const json artefact = identified["artefact"];
     EXPECT_NEAR(artefact["temperature_C"].get<double>(), 23.4, 0.05) << identified.dump(1);
     EXPECT_GE(artefact["u_temperature_K"].get<double>(), 0.1);
-    EXPECT_NEAR(artefact["growth"].get<double>() - 1.0, 3.4 * 11.5e-6, 1e-6);
+    EXPECT_NEAR(artefact["expansion_factor"].get<double>() - 1.0, 3.4 * 11.5e-6, 1e-6);
     EXPECT_THAT(identified["gate"]["notes"].dump(), testing::Not(HasSubstr("20 C")));
   }
 

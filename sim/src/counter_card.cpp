@@ -76,7 +76,6 @@ void CounterCard::make_scan(HostTime at) {
   const auto whole = out.written();
   const auto scan = whole.subspan(std::min(std::exchange(torn_, 0), whole.size()));
   fifo_.insert(fifo_.end(), scan.begin(), scan.end());
-  ++scans_made_;
 }
 
 std::uint64_t CounterCard::value_of(std::size_t channel, HostTime at) {

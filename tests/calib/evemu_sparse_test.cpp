@@ -50,7 +50,8 @@ TEST(EvemuSparse, PredictsWhatTheSolverPredicts) {
   options.lambda = s.sparse->lambda;
   const sparse::Path path =
       *sparse::fit_path(X, y, {sparse::PenaltyKind::Scad, s.sparse->gamma}, options);
-  const Eigen::VectorXd expected_mm = sparse::predict(path, X, path.reached() - 1);
+  const Eigen::VectorXd beta = path.coefficients.col(path.reached() - 1);  // intercept first
+  const Eigen::VectorXd expected_mm = (X * beta.tail(X.cols())).array() + beta(0);
 
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Vector3 V_mm = 1000 * design.B(o.rows[i].reading_m) * s.raw_c_m;

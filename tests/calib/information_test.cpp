@@ -271,23 +271,6 @@ TEST(Information, RefusesABlockOfWrongSize) {
   EXPECT_EQ(information.add(block).error().code, ErrorCode::DegenerateGeometry);
 }
 
-TEST(InformationByGroup, LeavesOutAGroup) {
-  InformationByGroup parts(6);
-  std::vector<Block> blocks(3, correlated_block());
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    blocks[i].group = 10 * i;
-    blocks[i].A *= 1.0 + static_cast<double>(i);
-    ASSERT_TRUE(parts.add(blocks[i]));
-  }
-  Information two(6);
-  ASSERT_TRUE(two.add(blocks[0]));
-  ASSERT_TRUE(two.add(blocks[2]));
-  EXPECT_LT(difference(triangle(parts.without(10)), triangle(two)), kRounding);
-  EXPECT_EQ(parts.groups(), (std::vector<std::size_t>{0, 10, 20}));
-  EXPECT_EQ(parts.all().rows(), 36u);
-  EXPECT_EQ(parts.of(7).rows(), 0u);
-}
-
 /// NIST StRD, Longley: observations and certified parameters
 /// (https://www.itl.nist.gov/div898/strd).
 struct Longley {

@@ -25,6 +25,22 @@ TEST(PathFrame, IsRightHandedWithA2TowardsTheBeam) {
   EXPECT_NEAR(f.a3.dot(Vector3(1.0, 0.4, 0.1)), 0, 1e-15);
 }
 
+/// Covariance of one sample: diag(sigma_r^2, (sigma_a / cos el)^2, sigma_a^2) of range, azimuth and
+/// elevation, propagated with the Jacobian J of the position. [Sanders 2023] eq. (8) to (10), with
+/// angles in place of the lengths of eq. (8).
+Matrix3 sample_covariance_m2(const Vector3& p_m, const Noise& noise) {
+  const double r = p_m.norm(), az = std::atan2(p_m.y(), p_m.x()), el = std::asin(p_m.z() / r);
+  Matrix3 J;
+  J << std::cos(el) * std::cos(az), -r * std::cos(el) * std::sin(az),
+      -r * std::sin(el) * std::cos(az), std::cos(el) * std::sin(az),
+      r * std::cos(el) * std::cos(az), -r * std::sin(el) * std::sin(az), std::sin(el), 0,
+      r * std::cos(el);
+  const double sa = noise.sigma_angle_rad;
+  const Vector3 variance(noise.sigma_range_m * noise.sigma_range_m, std::pow(sa / std::cos(el), 2),
+                         sa * sa);
+  return J * variance.asDiagonal() * J.transpose();
+}
+
 TEST(PathFrame, HasTheUncertaintyOfTheCovarianceAlongItsAxes) {
   const Vector3 beam(1.0, 0.4, 0.1);
   const PathFrame f = path_frame({0.3, -0.2, 0.5}, beam, kNoise);
@@ -39,20 +55,6 @@ TEST(PathFrame, AlongTheBeamIsAnyPerpendicularPair) {
   EXPECT_NEAR(f.a2.norm(), 1, 1e-15);
   EXPECT_NEAR(f.a1.dot(f.a2), 0, 1e-15);
   EXPECT_NEAR(f.sigma2_m, 4.5e-6, 1e-12);
-}
-
-TEST(SampleCovariance, IsTheSphericalOneThroughItsJacobian) {
-  const double r = 1.7, az = 0.6, el = 0.4;
-  Matrix3 J;
-  J << std::cos(el) * std::cos(az), -r * std::cos(el) * std::sin(az),
-      -r * std::sin(el) * std::cos(az), std::cos(el) * std::sin(az),
-      r * std::cos(el) * std::cos(az), -r * std::sin(el) * std::sin(az), std::sin(el), 0,
-      r * std::cos(el);
-  const double sa = kNoise.sigma_angle_rad;
-  const Vector3 variance(kNoise.sigma_range_m * kNoise.sigma_range_m,
-                         std::pow(sa / std::cos(el), 2), sa * sa);
-  EXPECT_TRUE(sample_covariance_m2(from_spherical(r, az, el), kNoise)
-                  .isApprox(J * variance.asDiagonal() * J.transpose(), 1e-12));
 }
 
 /// A block that crosses a node: its row is the mean of the rows, not the row of the mean.

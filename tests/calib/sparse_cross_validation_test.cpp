@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "sparse_problem.hpp"
+#include "sparse_solution.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -24,6 +25,12 @@ bool same_bits(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 Folds five_folds(const Problem& problem) {
   return random_folds(static_cast<std::size_t>(problem.y.size()), 5, 42).value();
+}
+
+/// The grid of one gamma.
+Result<GridSearch> search(const Problem& problem, const Penalty& penalty, const Folds& folds,
+                          const PathOptions& options = {}) {
+  return grid_search(problem.X, problem.y, penalty.kind, {penalty.gamma}, folds, options);
 }
 
 /// Mean squared error of held-out rows, from fits made one by one.
@@ -45,11 +52,11 @@ TEST(SparseCrossValidation, IsTheErrorOfFitsThatDidNotSeeTheRow) {
   const Problem problem = random_problem(50, 10, 21);
   const Penalty penalty{PenaltyKind::Scad, 3.7};
   const PathOptions options{.lambda = log_spaced(1.0, 0.01, 20)};
-  const auto cv = cross_validate(problem.X, problem.y, penalty, five_folds(problem), options);
-  ASSERT_TRUE(cv) << cv.error().text;
+  const auto grid = search(problem, penalty, five_folds(problem), options);
+  ASSERT_TRUE(grid) << grid.error().text;
   for (const Eigen::Index k : {0, 10, 19}) {
     // standardised twice instead of once: rounding of columns of size 1e4
-    EXPECT_NEAR(cv->error(k), error_by_hand(problem, five_folds(problem), penalty, options, k),
+    EXPECT_NEAR(grid->error(k, 0), error_by_hand(problem, five_folds(problem), penalty, options, k),
                 1e-10)
         << k;
   }
@@ -57,18 +64,18 @@ TEST(SparseCrossValidation, IsTheErrorOfFitsThatDidNotSeeTheRow) {
 
 TEST(SparseCrossValidation, ChoosesTheSmallestErrorAndBeatsTheEmptyModel) {
   const Problem problem = random_problem(50, 10, 22);
-  const auto cv = cross_validate(problem.X, problem.y, {}, five_folds(problem));
-  ASSERT_TRUE(cv) << cv.error().text;
-  EXPECT_EQ(cv->error(cv->best), cv->error.minCoeff());
-  EXPECT_LT(cv->error(cv->best),
-            0.2 * cv->null_error);  // noise 0.09, variance above 1
-  EXPECT_GT(cv->standard_error(cv->best), 0.0);
+  const auto grid = search(problem, {}, five_folds(problem));
+  ASSERT_TRUE(grid) << grid.error().text;
+  const double least = grid->error(grid->best.lambda, 0);
+  EXPECT_EQ(least, grid->error.minCoeff());
+  const double variance = (problem.y.array() - problem.y.mean()).square().mean();
+  EXPECT_LT(least, 0.2 * variance);  // noise 0.09, variance above 1
 }
 
 TEST(SparseCrossValidation, OfAnEmptyModelIsTheSpreadOfTheRows) {
   const Problem problem = random_problem(50, 10, 23);
-  const auto cv = cross_validate(problem.X, problem.y, {}, five_folds(problem), {.lambda = {1e6}});
-  ASSERT_TRUE(cv) << cv.error().text;
+  const auto grid = search(problem, {}, five_folds(problem), {.lambda = {1e6}});
+  ASSERT_TRUE(grid) << grid.error().text;
   double sum = 0.0;
   for (int fold = 0; fold < 5; ++fold) {
     std::vector<Eigen::Index> in, out;
@@ -77,10 +84,10 @@ TEST(SparseCrossValidation, OfAnEmptyModelIsTheSpreadOfTheRows) {
     }
     sum += (problem.y(out).array() - problem.y(in).mean()).square().sum();
   }
-  EXPECT_NEAR(cv->error(0), sum / 50, 1e-12);
+  EXPECT_NEAR(grid->error(0, 0), sum / 50, 1e-12);
 }
 
-TEST(SparseGridSearch, EveryColumnIsItsOwnCrossValidationBitForBit) {
+TEST(SparseGridSearch, EveryColumnIsItsOwnSearchBitForBit) {
   const Problem problem = random_problem(60, 20, 24);
   const auto gamma = equally_spaced(2.001, 30.0, 11);  // more values than one register holds
   const auto grid =
@@ -88,12 +95,10 @@ TEST(SparseGridSearch, EveryColumnIsItsOwnCrossValidationBitForBit) {
   ASSERT_TRUE(grid) << grid.error().text;
 
   for (std::size_t g = 0; g < gamma.size(); ++g) {
-    const auto cv =
-        cross_validate(problem.X, problem.y, {PenaltyKind::Scad, gamma[g]}, five_folds(problem))
-            .value();
-    EXPECT_TRUE(same_bits(grid->error.col(static_cast<Eigen::Index>(g)), cv.error)) << gamma[g];
-    EXPECT_TRUE(same_bits(grid->paths[g].coefficients, cv.path.coefficients)) << gamma[g];
-    EXPECT_EQ(grid->paths[g].sweeps, cv.path.sweeps);
+    const auto one = search(problem, {PenaltyKind::Scad, gamma[g]}, five_folds(problem)).value();
+    EXPECT_TRUE(same_bits(grid->error.col(static_cast<Eigen::Index>(g)), one.error)) << gamma[g];
+    EXPECT_TRUE(same_bits(grid->paths[g].coefficients, one.paths[0].coefficients)) << gamma[g];
+    EXPECT_EQ(grid->paths[g].sweeps, one.paths[0].sweeps);
   }
 }
 
@@ -117,7 +122,11 @@ TEST(SparseGridSearch, GivesTheSameBitsOnTwoThreads) {
                                {}, on_two_threads);
   ASSERT_TRUE(one && two);
   EXPECT_TRUE(same_bits(one->error, two->error));
-  EXPECT_TRUE(same_bits(one->best_coefficients(), two->best_coefficients()));
+  EXPECT_EQ(one->best.lambda, two->best.lambda);
+  EXPECT_EQ(one->best.gamma, two->best.gamma);
+  for (std::size_t g = 0; g < gamma.size(); ++g) {
+    EXPECT_TRUE(same_bits(one->paths[g].coefficients, two->paths[g].coefficients)) << gamma[g];
+  }
 }
 
 TEST(SparseGridSearch, CellsBeyondSomeFoldsBudgetAreMissing) {
@@ -141,9 +150,7 @@ TEST(SparseGridSearch, TakesTheFirstOfEqualCells) {
 
 TEST(SparseGridSearch, RefusesFoldsThatDoNotFit) {
   const Problem problem = random_problem(20, 4, 28);
-  const auto with = [&](const Folds& folds) {
-    return cross_validate(problem.X, problem.y, {}, folds).error();
-  };
+  const auto with = [&](const Folds& folds) { return search(problem, {}, folds).error(); };
   EXPECT_EQ(with(random_folds(19, 5, 1).value()).code, ErrorCode::BadInput);
   EXPECT_EQ(with({.of_row = std::vector<int>(20, 0), .count = 2}).code, ErrorCode::BadInput);
   EXPECT_EQ(with({.of_row = std::vector<int>(20, 3), .count = 2}).code, ErrorCode::BadInput);
@@ -153,10 +160,10 @@ TEST(SparseGridSearch, NamesTheFoldThatLeavesTooFewRows) {
   const Problem problem = random_problem(20, 4, 29);
   Folds folds{.of_row = std::vector<int>(20, 1), .count = 2};
   folds.of_row[0] = 0;  // without fold 1 only one row remains
-  const auto cv = cross_validate(problem.X, problem.y, {}, folds);
-  ASSERT_FALSE(cv);
-  EXPECT_EQ(cv.error().code, ErrorCode::TooFewObservations);
-  EXPECT_THAT(cv.error().text, HasSubstr("without fold 1"));
+  const auto grid = search(problem, {}, folds);
+  ASSERT_FALSE(grid);
+  EXPECT_EQ(grid.error().code, ErrorCode::TooFewObservations);
+  EXPECT_THAT(grid.error().text, HasSubstr("without fold 1"));
 }
 
 TEST(SparseGridSearch, RefusesAnEmptyOrBadListOfGammas) {

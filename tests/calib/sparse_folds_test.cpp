@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <set>
 
 namespace {
 using namespace abbe::calib;
@@ -29,26 +28,6 @@ TEST(SparseFolds, TheSameSeedGivesTheSameFolds) {
   EXPECT_NE(random_folds(216, 10, 7)->of_row, random_folds(216, 10, 8)->of_row);
 }
 
-TEST(SparseFolds, GroupsStayTogether) {
-  std::vector<int> ball;
-  for (int row = 0; row < 216; ++row) {
-    ball.push_back(100 + row / 3);
-  }
-  const Folds folds = group_folds(ball, 10, 5).value();
-  for (std::size_t row = 0; row < 216; row += 3) {
-    EXPECT_EQ(folds.of_row[row], folds.of_row[row + 1]);
-    EXPECT_EQ(folds.of_row[row], folds.of_row[row + 2]);
-  }
-  EXPECT_EQ(std::set<int>(folds.of_row.begin(), folds.of_row.end()).size(), 10U);
-}
-
-TEST(SparseFolds, AsManyFoldsAsGroupsLeavesOneOutAtATime) {
-  const Folds folds = group_folds(std::array{4, 4, 9, 2, 2, 2}, 3, 1).value();
-  EXPECT_NE(folds.of_row[0], folds.of_row[2]);
-  EXPECT_NE(folds.of_row[2], folds.of_row[3]);
-  EXPECT_EQ(folds.of_row[3], folds.of_row[5]);
-}
-
 TEST(SparseFolds, LabelsAreNumberedInIncreasingOrder) {
   const Folds folds = folds_from_labels(std::array{7, -1, 7, 3}).value();
   EXPECT_THAT(folds.of_row, ElementsAre(2, 0, 2, 1));
@@ -67,7 +46,6 @@ TEST(SparseFolds, NamesTheLineThatIsNoNumber) {
 TEST(SparseFolds, RefusesTooFewOfAnything) {
   EXPECT_EQ(random_folds(4, 5, 1).error().code, ErrorCode::TooFewObservations);
   EXPECT_EQ(random_folds(4, 1, 1).error().code, ErrorCode::TooFewObservations);
-  EXPECT_EQ(group_folds(std::array{1, 1, 2}, 3, 1).error().code, ErrorCode::TooFewObservations);
   EXPECT_EQ(folds_from_labels(std::array{1, 1}).error().code, ErrorCode::TooFewObservations);
   EXPECT_EQ(parse_folds("").error().code, ErrorCode::TooFewObservations);
 }

@@ -10,8 +10,8 @@
 #include <numeric>
 
 #include "abbe/calib/internal/sparse/cross_validation.hpp"
-#include "abbe/calib/internal/sparse/optimality.hpp"
 #include "sparse_problem.hpp"
+#include "sparse_solution.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -27,17 +27,6 @@ PathOptions exact() {
   return {.lambda = {}, .tolerance = 1e-12, .max_sweeps = 1000000};
 }
 
-/// The one-coefficient solutions as printed in their papers.
-double closed_form(const Penalty& penalty, double l, double z) {
-  const double size = std::abs(z), g = penalty.gamma;
-  const double soft = std::max(size - l, 0.0);
-  double b = soft;
-  if (penalty.kind == PenaltyKind::Mcp) b = size <= g * l ? soft / (1 - 1 / g) : size;
-  if (penalty.kind == PenaltyKind::Scad && size > 2 * l)
-    b = size <= g * l ? ((g - 1) * size - g * l) / (g - 2) : size;
-  return std::copysign(b, z);
-}
-
 TEST(SparsePath, OrthogonalColumnsHaveClosedFormSolutions) {
   const Eigen::MatrixXd X = orthogonal_design();
   const Eigen::VectorXd y = random_problem(16, 1, 11).y * 3.0;
@@ -48,8 +37,7 @@ TEST(SparsePath, OrthogonalColumnsHaveClosedFormSolutions) {
     ASSERT_TRUE(path) << path.error().text;
     for (Eigen::Index k = 0; k < path->reached(); ++k) {
       for (Eigen::Index j = 0; j < z.size(); ++j) {
-        const double expected =
-            closed_form(penalty, path->lambda[static_cast<std::size_t>(k)], z(j));
+        const double expected = minimiser(penalty, path->lambda[static_cast<std::size_t>(k)], z(j));
         ASSERT_NEAR(path->coefficients(1 + j, k), expected, 1e-13)
             << name(penalty.kind) << ' ' << k << ' ' << j;
       }
@@ -68,10 +56,38 @@ TEST(SparsePath, EverySolutionIsAStationaryPoint) {
         const double lambda = path->lambda[static_cast<std::size_t>(k)];
         // a change of 1e-12 rms(y) in the last sweep leaves gradients of that size times the number
         // of columns
-        ASSERT_LE(*kkt_violation(problem.X, problem.y, penalty, lambda, path->standardised.col(k)),
+        ASSERT_LE(kkt_violation(problem.X, problem.y, penalty, lambda, path->standardised.col(k)),
                   1e-10)
             << name(penalty.kind) << " seed " << seed << " lambda " << lambda;
       }
+    }
+  }
+}
+
+TEST(SparsePath, ANudgedSolutionIsNotStationary) {
+  const Eigen::MatrixXd X = orthogonal_design();
+  const Eigen::VectorXd y = random_problem(16, 1, 31).y;
+  const Penalty lasso{PenaltyKind::Lasso};
+  const auto path = fit_path(X, y, lasso).value();
+  Eigen::VectorXd b = path.standardised.col(50);
+  EXPECT_LE(kkt_violation(X, y, lasso, path.lambda[50], b), 1e-13);
+  b(2) += 0.01;  // orthogonal columns: the gradient changes by the same amount
+  EXPECT_NEAR(kkt_violation(X, y, lasso, path.lambda[50], b), 0.01, 1e-12);
+}
+
+TEST(SparsePath, SolutionsOfTheLassoAreBelowTheirNeighbours) {
+  const Problem problem = random_problem(40, 8, 32);
+  const Penalty lasso{PenaltyKind::Lasso};
+  const auto path =
+      fit_path(problem.X, problem.y, lasso, {.lambda = {}, .tolerance = 1e-10}).value();
+  const Eigen::VectorXd b = path.standardised.col(40);
+  const double least = objective(problem.X, problem.y, lasso, path.lambda[40], b);
+
+  for (Eigen::Index j = 0; j < b.size(); ++j) {
+    for (const double step : {-0.01, 0.01}) {
+      Eigen::VectorXd other = b;
+      other(j) += step;
+      EXPECT_LT(least, objective(problem.X, problem.y, lasso, path.lambda[40], other));
     }
   }
 }
@@ -100,10 +116,10 @@ TEST(SparsePath, StartsAtTheSmallestLambdaWithAnEmptySolution) {
 
 TEST(SparsePath, DefaultLambdaFallsToATwentiethWithFewRows) {
   const Problem problem = random_problem(15, 20, 8);
-  const auto lambda = default_lambda(problem.X, problem.y, 50);
-  ASSERT_TRUE(lambda);
-  EXPECT_EQ(lambda->size(), 50U);
-  EXPECT_NEAR(lambda->back() / lambda->front(), 0.05, 1e-12);
+  const auto path = fit_path(problem.X, problem.y, {PenaltyKind::Lasso});
+  ASSERT_TRUE(path);
+  EXPECT_EQ(path->lambda.size(), 100U);
+  EXPECT_NEAR(path->lambda.back() / path->lambda.front(), 0.05, 1e-12);
 }
 
 TEST(SparsePath, DoesNotDependOnUnitsAndOriginsOfColumns) {
@@ -155,8 +171,8 @@ TEST(SparsePath, MoreColumnsThanRowsStillSolvesTheLasso) {
   const auto path = fit_path(problem.X, problem.y, {PenaltyKind::Lasso}, exact());
   ASSERT_TRUE(path);
   const Eigen::Index last = path->reached() - 1;
-  EXPECT_LE(*kkt_violation(problem.X, problem.y, path->penalty, path->lambda.back(),
-                           path->standardised.col(last)),
+  EXPECT_LE(kkt_violation(problem.X, problem.y, path->penalty, path->lambda.back(),
+                          path->standardised.col(last)),
             1e-10);
   EXPECT_LE((path->standardised.col(last).array() != 0.0).count(), 29);
 }

@@ -77,17 +77,19 @@ TEST_P(SparseReferenceGrid, PathAtTheBestGammaIsThatOfNcvreg) {
   const ReferenceGrid reference = reference_grid(folder(), GetParam());
   Eigen::Index row = 0, column = 0;
   reference.error.array().isNaN().select(1.0, reference.error).minCoeff(&row, &column);
-  const Penalty penalty{PenaltyKind::Scad, reference.gamma[static_cast<std::size_t>(column)]};
-  const auto cv = cross_validate(problem().X, problem().y, penalty, folds(), reference.options);
-  ASSERT_TRUE(cv) << cv.error().text;
-  EXPECT_EQ(cv->best, row);
+  const auto grid =
+      grid_search(problem().X, problem().y, PenaltyKind::Scad,
+                  {reference.gamma[static_cast<std::size_t>(column)]}, folds(), reference.options);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->best.lambda, row);
 
   const Eigen::MatrixXd expected =
       numbers(read_table(folder(), std::string(GetParam()) + "_path.csv"));
-  ASSERT_EQ(cv->path.reached(), expected.rows());
-  EXPECT_EQ(cv->path.sweeps, std::vector<long>(expected.col(1).begin(), expected.col(1).end()));
-  EXPECT_LE(scaled_difference(cv->path.coefficients, expected.rightCols(46).transpose()), kAsked);
-  EXPECT_LE((cv->path.residual_sum_squares - expected.col(2)).cwiseAbs().maxCoeff(), kAsked);
+  const Path& path = grid->paths.front();
+  ASSERT_EQ(path.reached(), expected.rows());
+  EXPECT_EQ(path.sweeps, std::vector<long>(expected.col(1).begin(), expected.col(1).end()));
+  EXPECT_LE(scaled_difference(path.coefficients, expected.rightCols(46).transpose()), kAsked);
+  EXPECT_LE((path.residual_sum_squares - expected.col(2)).cwiseAbs().maxCoeff(), kAsked);
 }
 
 INSTANTIATE_TEST_SUITE_P(Folds, SparseReferenceGrid,

@@ -5,10 +5,11 @@
 #include <cstring>
 #include <random>
 
-#include "abbe/calib/internal/sparse/penalty.hpp"
+#include "sparse_solution.hpp"
 
 namespace {
 using namespace abbe::calib::sparse;
+using namespace abbe::tests::sparse;
 
 /// Eight lassos of one random Gram matrix, with different lambdas and different columns excluded.
 struct Eight {

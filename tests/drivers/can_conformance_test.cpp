@@ -5,6 +5,7 @@
 #include "abbe/protocol/can/error_frame.hpp"
 #include "driver_conformance.hpp"
 #include "encoder_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -48,7 +49,7 @@ class EncoderConformancePeer {
   }
 
   drivers::Device& device() { return *device_; }
-  drivers::SteppedTime& time() { return time_; }
+  SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
     std::array<protocol::AxisSample, 64> out{};
     const auto n = device_->samples().pop(out);
@@ -94,7 +95,7 @@ class EncoderConformancePeer {
   void restart() { peer_.restart(); }
 
  private:
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   EncoderPeer peer_{std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
   std::unique_ptr<drivers::EncoderDevice> device_;
   bool holding_ = false;

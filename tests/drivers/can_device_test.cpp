@@ -4,6 +4,7 @@
 
 #include "abbe/drivers/device_thread.hpp"
 #include "encoder_device_on_udp.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -395,12 +396,12 @@ TEST(EncoderDevice, StreamsInItsOwnThreadOnTheRealClock) {
 }
 
 TEST(EncoderDevice, RefusesABadConfiguration) {
-  SteppedTime time;
+  tests::SteppedTime time;
   EXPECT_FALSE(EncoderDevice::create({}, std::make_unique<UdpCanBus>(UdpCanOptions{}, time), time));
 }
 
 TEST(EncoderDevice, ReportsThatThePeerDoesNotListenAndKeepsTrying) {
-  SteppedTime time;
+  tests::SteppedTime time;
   std::uint16_t port = 0;
   {
     port = EncoderPeer{std::span<const EncoderIdentity>{}}.port();

@@ -7,6 +7,7 @@
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/sim/encoder_bus.hpp"
 #include "encoder_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -83,7 +84,7 @@ class ExternalSync : public testing::Test {
     samples_.clear();
   }
 
-  SteppedTime time_;
+  tests::SteppedTime time_;
   sim::VirtualMachine machine_ = machine_at(0.1, -0.2);
   std::uint16_t port_ = free_port();
   sim::EncoderBus bus_ = open_bus();

@@ -16,13 +16,13 @@
 #include "abbe/drivers/sample_ring.hpp"
 #include "abbe/drivers/status_board.hpp"
 #include "driver_conformance.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
 
 using namespace std::chrono_literals;
 using drivers::DeviceStatus;
-using drivers::SteppedTime;
 using protocol::HostTime;
 using protocol::ProbeTrigger;
 using protocol::SampleFlag;

@@ -2,6 +2,7 @@
 
 #include "counter_card_peer.hpp"
 #include "driver_conformance.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -21,7 +22,7 @@ class FaultyCard {
   }
 
   drivers::Device& device() { return *bench_.device; }
-  drivers::SteppedTime& time() { return bench_.time; }
+  SteppedTime& time() { return bench_.time; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
     for (const auto& sample : bench_.take_samples()) heads.push_back(sample.head);
   }

@@ -9,6 +9,7 @@
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/sim/counter_card_setup.hpp"
 #include "counter_card_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -285,7 +286,7 @@ TEST(CounterCardDevice, ReportsThatTheLatchCountsAnotherClock) {
 TEST(CounterCardDevice, SearchesForACardWithLibusbAndReportsThatThereIsNone) {
   auto options = CardBench::default_options();
   options.serial = "no such card";
-  drivers::SteppedTime time;
+  SteppedTime time;
   auto link = std::make_unique<drivers::LibusbLink>(drivers::identity_of(options), time);
   auto device = drivers::CounterCardDevice::create(options, std::move(link), time);
   ASSERT_TRUE(device.has_value());
@@ -304,7 +305,7 @@ TEST(CounterCardDevice, SearchesForACardWithLibusbAndReportsThatThereIsNone) {
 TEST(CounterCardDevice, RefusesAnImpossibleWiring) {
   auto options = CardBench::default_options();
   options.receiver.wiring.axes[0].scale = 0.0;
-  drivers::SteppedTime time;
+  SteppedTime time;
   auto link = std::make_unique<drivers::UsbipLink>(drivers::UsbipOptions{}, time);
   const auto device = drivers::CounterCardDevice::create(options, std::move(link), time);
   ASSERT_FALSE(device.has_value());

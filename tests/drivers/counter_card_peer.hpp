@@ -11,6 +11,7 @@
 #include "abbe/drivers/counter_card/device.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
 #include "abbe/sim/usbip_server.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 
@@ -109,7 +110,7 @@ class CardBench {
   }
 
   static constexpr std::chrono::nanoseconds kCycle = 250us;
-  drivers::SteppedTime time;
+  SteppedTime time;
   sim::UsbipServer server;
   ScanKeeper keeper;
   std::unique_ptr<drivers::CounterCardDevice> device;

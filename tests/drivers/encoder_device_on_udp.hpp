@@ -13,6 +13,7 @@
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
 #include "encoder_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::drivers {
 
@@ -134,7 +135,7 @@ class EncoderDeviceOnUdp : public testing::Test {
     }
   }
 
-  SteppedTime time;
+  tests::SteppedTime time;
   tests::EncoderPeer peer;
   FailingBus* bus = nullptr;  ///< the device's
   std::unique_ptr<EncoderDevice> device;

@@ -3,6 +3,7 @@
 #include "abbe/drivers/environment/device.hpp"
 #include "driver_conformance.hpp"
 #include "modbus_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -23,7 +24,7 @@ class FaultyModbus {
   }
 
   drivers::Device& device() { return *device_; }
-  drivers::SteppedTime& time() { return time_; }
+  SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
     if (reader_away_ > 0) {
       --reader_away_;
@@ -69,7 +70,7 @@ class FaultyModbus {
     return o;
   }
 
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   ModbusPeer peer_{kTransport};
   std::unique_ptr<drivers::EnvironmentDevice> device_ =
       drivers::EnvironmentDevice::create(options(), time_).value();

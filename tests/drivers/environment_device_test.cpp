@@ -8,6 +8,7 @@
 #include "abbe/drivers/environment/known_maps.hpp"
 #include "abbe/sim/modbus_server.hpp"
 #include "modbus_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -67,7 +68,7 @@ class EnvironmentAgainstTheSimulator : public testing::Test {
     return {out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n)};
   }
 
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   std::string link_;
   std::unique_ptr<sim::ModbusServer> server_;
   std::unique_ptr<EnvironmentDevice> device_;

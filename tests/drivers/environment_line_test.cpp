@@ -10,6 +10,7 @@
 
 #include "abbe/drivers/environment/line.hpp"
 #include "modbus_bus_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -49,7 +50,7 @@ class OneLine : public testing::TestWithParam<modbus::Transport> {
   }
   drivers::DeviceStatus status(std::size_t i) { return line_->device(i).status(); }
 
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   ModbusBusPeer bus_{GetParam()};
   std::unique_ptr<EnvironmentLine> line_;
 };
@@ -150,7 +151,7 @@ TEST(EnvironmentLine, WaitsWhileItIsClosedWhetherOneDeviceIsOnItOrTwo) {
 }
 
 TEST(EnvironmentLine, RefusesDevicesThatAreNotOnOneLine) {
-  const drivers::SteppedTime time;
+  const SteppedTime time;
   ModbusBusPeer bus{modbus::Transport::Rtu};
   auto other = slave(bus, 2);
   std::get<drivers::ModbusSerial>(other.address).baud = 9600;
@@ -163,7 +164,7 @@ TEST(EnvironmentLine, RefusesDevicesThatAreNotOnOneLine) {
 
 // Neither name is there at the start: they cannot be known to be one line before it is plugged in.
 TEST(EnvironmentLine, TwoNamesOfALineThatWasAbsentDoNotShareItSilently) {
-  drivers::SteppedTime time;
+  SteppedTime time;
   ModbusBusPeer bus{modbus::Transport::Rtu};
   bus.slaves[1] = bus.slaves[2] = {};
   std::string folder = testing::TempDir() + "abbe-line-XXXXXX";

@@ -2,6 +2,8 @@
 #include "driver_conformance.hpp"
 #include "ippdme_peer.hpp"
 
+#include "stepped_time.hpp"
+
 namespace abbe::tests {
 namespace {
 
@@ -17,7 +19,7 @@ class FaultyMeasuringMachine {
   static std::set<std::string_view> shown(Fault fault) { return shown_over_tcp(fault, "ready"); }
 
   drivers::Device& device() { return *device_; }
-  drivers::SteppedTime& time() { return time_; }
+  SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
     std::array<protocol::AxisSample, 64> positions{};
     while (const std::size_t n = device_->positions().pop(positions))
@@ -55,7 +57,7 @@ class FaultyMeasuringMachine {
     return o;
   }
 
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   IppDmePeer peer_{time_.now()};
   bool holding_ = false;
   std::unique_ptr<drivers::IppDevice> device_ =

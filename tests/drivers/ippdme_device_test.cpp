@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "ippdme_stage.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -14,7 +15,6 @@ using namespace std::chrono_literals;
 using drivers::IppDevice;
 using drivers::IppDeviceOptions;
 using drivers::ProbePoint;
-using drivers::SteppedTime;
 using protocol::ProbeTrigger;
 using protocol::TouchFlag;
 

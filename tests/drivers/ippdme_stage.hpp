@@ -11,6 +11,7 @@
 
 #include "abbe/drivers/ippdme/device.hpp"
 #include "ippdme_peer.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 
@@ -57,7 +58,7 @@ struct IppStage {
     return cycles_until(std::chrono::seconds{30}, [&] { return device->status().state == state; });
   }
 
-  drivers::SteppedTime time;
+  SteppedTime time;
   IppDmePeer peer;
   std::unique_ptr<drivers::IppDevice> device;
   std::vector<protocol::ProbeTrigger> touches;

@@ -4,6 +4,7 @@
 
 #include "abbe/drivers/counter_card/device.hpp"
 #include "fake_libusb.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -28,7 +29,7 @@ class LibusbLinkTest : public ::testing::Test {
     return {};
   }
 
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   libusb_device ours_{.serial = "A", .address = 1}, other_{.serial = "B", .address = 2};
 };
 

@@ -8,6 +8,7 @@
 
 #include "abbe/drivers/latency_histogram.hpp"
 #include "abbe/drivers/time_source.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -17,7 +18,6 @@ using drivers::FaultText;
 using drivers::LatencyHistogram;
 using drivers::MonotonicTime;
 using drivers::StatusBoard;
-using drivers::SteppedTime;
 using protocol::HostTime;
 using std::chrono::nanoseconds;
 

@@ -2,6 +2,8 @@
 #include "driver_conformance.hpp"
 #include "tracker_peer.hpp"
 
+#include "stepped_time.hpp"
+
 namespace abbe::tests {
 namespace {
 
@@ -20,7 +22,7 @@ class FaultyTracker {
   }
 
   drivers::Device& device() { return *device_; }
-  drivers::SteppedTime& time() { return time_; }
+  SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
     std::array<protocol::TrackerPoint, 256> out{};
     while (const std::size_t n = device_->points().pop(out)) {
@@ -55,7 +57,7 @@ class FaultyTracker {
     return o;
   }
 
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   tracker::TrackerPeer peer_{time_.now()};
   bool holding_ = false;
   std::unique_ptr<drivers::TrackerDevice> device_ =

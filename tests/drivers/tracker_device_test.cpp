@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "abbe/protocol/emscon/requests.hpp"
+#include "stepped_time.hpp"
 #include "tracker_peer.hpp"
 
 namespace abbe::drivers {
@@ -65,7 +66,7 @@ class TrackerDeviceTest : public testing::Test {
       raw_.insert(raw_.end(), blocks.begin(), blocks.begin() + n);
   }
 
-  SteppedTime time_;
+  tests::SteppedTime time_;
   tests::tracker::TrackerPeer peer_;
   std::unique_ptr<TrackerDevice> device_;
   bool served_ = true;
@@ -293,7 +294,7 @@ TEST_F(ColdTracker, IsWaitedFor) {
 }
 
 TEST(TrackerDeviceOptions, WithoutAHostAreRefused) {
-  SteppedTime time;
+  tests::SteppedTime time;
   TrackerDeviceOptions options;
   options.host = "";
   const auto device = TrackerDevice::create(options, time);

@@ -1,6 +1,7 @@
 /// A controller is left as it was found.
 
 #include "abbe/drivers/tracker/device.hpp"
+#include "stepped_time.hpp"
 #include "tracker_peer.hpp"
 
 #include <gmock/gmock.h>
@@ -69,7 +70,7 @@ class TrackerSettingsTest : public testing::Test {
     return emscon::Acknowledge{emscon::command_of(request), Status::Unknown};
   }
 
-  SteppedTime time_;
+  tests::SteppedTime time_;
   tests::tracker::TrackerPeer peer_;
   TrackerDeviceOptions options_;
   std::unique_ptr<TrackerDevice> device_;

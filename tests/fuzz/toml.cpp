@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "abbe/settings/bounded_toml.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 
 namespace {
 

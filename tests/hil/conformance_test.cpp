@@ -3,6 +3,7 @@
 #include "abbe/drivers/can/encoder_device.hpp"
 #include "abbe/drivers/can/socket_can_bus.hpp"
 #include "driver_conformance.hpp"
+#include "stepped_time.hpp"
 #include "vcan_nodes.hpp"
 
 namespace abbe::tests {
@@ -30,7 +31,7 @@ class VcanConformancePeer {
   }
 
   drivers::Device& device() { return *device_; }
-  drivers::SteppedTime& time() { return time_; }
+  SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
     std::array<protocol::AxisSample, 64> out{};
     const auto n = device_->samples().pop(out);
@@ -77,7 +78,7 @@ class VcanConformancePeer {
 
  private:
   VirtualCan vcan_;
-  drivers::SteppedTime time_;
+  SteppedTime time_;
   VcanNodes nodes_{vcan_,
                    std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
   std::unique_ptr<drivers::EncoderDevice> device_;

@@ -74,7 +74,7 @@ TEST(Emergency, IsCodeRegisterAndFiveManufacturerBytes) {
   const auto emergency = decode_emergency(frame);
   ASSERT_TRUE(emergency);
   EXPECT_EQ(emergency->node, 3);
-  EXPECT_EQ(emergency->code, static_cast<std::uint16_t>(EmergencyCode::HeartbeatLost));
+  EXPECT_EQ(emergency->code, 0x8130);  // heartbeat lost
   EXPECT_EQ(emergency->error_register, 0x11);
   EXPECT_EQ(encode_emergency(*emergency), frame);
 }

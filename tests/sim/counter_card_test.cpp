@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "abbe/protocol/quad08/sequences.hpp"
@@ -142,19 +144,23 @@ TEST(UsbipServer, ListsTheCardForUsbipAttach) {
   auto server = UsbipServer::open(0, options());
   ASSERT_TRUE(server);
   const Socket client = test::connected(SOCK_STREAM, server->port());
-  std::array<std::byte, 8> request{};
-
-  ASSERT_EQ(usbip::encode_device_list_request(request), request.size());
-  test::send_bytes(client, request);
+  // version 1.1.1, request of the device list, status 0
+  constexpr std::array<std::byte, 8> kRequest{std::byte{0x01}, std::byte{0x11}, std::byte{0x80},
+                                              std::byte{0x05}};
+  test::send_bytes(client, kRequest);
   for (int i = 0; i < 50; ++i) server->poll(kCardStart);
   const auto answer = test::receive_bytes(client);
-  auto list = usbip::DeviceListView::parse(answer);
-  ASSERT_TRUE(list) << usbip::to_text(list.error());
-  const auto device = list->next();
-  ASSERT_TRUE(device);
-  EXPECT_EQ(device->bus_id.view(), "1-1");
-  EXPECT_EQ(device->vendor, quad08::kVendor);
-  EXPECT_EQ(device->product, quad08::kProduct);
+  // the head, the number of devices, then the device as in an import reply
+  ASSERT_GE(answer.size(), 12 + usbip::kExportedDeviceSize);
+  EXPECT_EQ(answer[11], std::byte{1});
+  std::array<std::byte, usbip::kImportReplySize> reply{};
+  const usbip::ExportedDevice any;
+  (void)usbip::encode_import_reply(usbip::OpStatus::Ok, &any, reply);
+  std::copy_n(answer.begin() + 12, usbip::kExportedDeviceSize, reply.begin() + usbip::kOpHeadSize);
+  const auto device = usbip::decode_import_reply(reply)->device;
+  EXPECT_EQ(device.bus_id.view(), "1-1");
+  EXPECT_EQ(device.vendor, quad08::kVendor);
+  EXPECT_EQ(device.product, quad08::kProduct);
 }
 
 TEST(UsbipServer, RefusesABusIdItDoesNotHave) {

@@ -34,6 +34,7 @@
 #include "abbe/drivers/time_source.hpp"
 #include "abbe/protocol/samples.hpp"
 #include "allocation_count.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::tests {
 
@@ -60,7 +61,7 @@ inline std::set<std::string_view> shown_over_tcp(Fault fault, std::string_view w
 template <class P>
 concept FaultyPeer = requires(P p, std::vector<protocol::SampleHead>& heads) {
   { p.device() } -> std::same_as<drivers::Device&>;
-  { p.time() } -> std::same_as<drivers::SteppedTime&>;
+  { p.time() } -> std::same_as<SteppedTime&>;
   /// Takes all samples from the device's sample ring (from all rings, if several carry the
   /// measurement).
   p.take_samples(heads);

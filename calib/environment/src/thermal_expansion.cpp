@@ -15,24 +15,10 @@ double u_expansion_factor(const Expansion& e) noexcept {
                              e.alpha_per_K * e.u_temperature_K);
 }
 
-UncertainLength length_at_reference(double length_m, const Expansion& part) noexcept {
-  const double g = expansion_factor(part);
-  return {length_m / g, std::abs(length_m) * u_expansion_factor(part) / (g * g)};
-}
-
 UncertainLength true_position(double reading_m, double fixed_m, const Expansion& scale) noexcept {
   const double from_fixed_m = reading_m - fixed_m;
   return {fixed_m + from_fixed_m * expansion_factor(scale),
           std::abs(from_fixed_m) * u_expansion_factor(scale)};
-}
-
-UncertainLength length_at_reference(double reading_m, const Expansion& scale,
-                                    const Expansion& part) noexcept {
-  const double ratio = expansion_factor(scale) / expansion_factor(part);
-  const double u_ratio =
-      ratio * root_sum_of_squares(u_expansion_factor(scale) / expansion_factor(scale),
-                                  u_expansion_factor(part) / expansion_factor(part));
-  return {reading_m * ratio, std::abs(reading_m) * u_ratio};
 }
 
 }  // namespace abbe::calib

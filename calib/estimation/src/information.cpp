@@ -212,39 +212,4 @@ Information Information::without_unknowns(std::span<const std::size_t> eliminate
   return result;
 }
 
-Result<void> InformationByGroup::add(const Block& block) {
-  return parts_.try_emplace(block.group, unknowns_).first->second.add(block);
-}
-
-std::vector<std::size_t> InformationByGroup::groups() const {
-  std::vector<std::size_t> groups;
-  for (const auto& [group, part] : parts_) {
-    groups.push_back(group);
-  }
-  return groups;
-}
-
-Information InformationByGroup::of(std::size_t group) const {
-  const auto part = parts_.find(group);
-  return part == parts_.end() ? Information(unknowns_) : part->second;
-}
-
-Information InformationByGroup::all() const {
-  Information sum(unknowns_);
-  for (const auto& [group, part] : parts_) {
-    sum += part;
-  }
-  return sum;
-}
-
-Information InformationByGroup::without(std::size_t group) const {
-  Information sum(unknowns_);
-  for (const auto& [other, part] : parts_) {
-    if (other != group) {
-      sum += part;
-    }
-  }
-  return sum;
-}
-
 }  // namespace abbe::calib::estimation

@@ -1,6 +1,5 @@
 #include "abbe/calib/geometry/equivalent_model.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <map>
 #include <numeric>
@@ -15,7 +14,7 @@ namespace {
 /// formed.
 struct CombinedRow {
   Eigen::RowVectorXd w;
-  std::vector<PolynomialShare> shares;  ///< component = row of A
+  std::vector<PolynomialShare> shares;
 };
 
 using LikeTerms = std::map<std::pair<std::size_t, Monomial>, Eigen::RowVectorXd>;
@@ -25,7 +24,7 @@ LikeTerms like_terms(const ErrorPolynomials& A) {
   const auto h = static_cast<Eigen::Index>(A.names().size());
   for (const PolynomialTerm& t : A.terms()) {
     Eigen::RowVectorXd& w =
-        found.try_emplace({t.row, t.monomial}, Eigen::RowVectorXd::Zero(h)).first->second;
+        found.try_emplace({t.component, t.monomial}, Eigen::RowVectorXd::Zero(h)).first->second;
     w(static_cast<Eigen::Index>(t.coefficient)) += t.factor;
   }
   return found;
@@ -119,7 +118,7 @@ Result<EquivalentModel> EquivalentModel::of(const KinematicChain& chain, int ord
   const Result<ErrorPolynomials> at_zero = ErrorPolynomials::of(chain, order);
   ABBE_TRY(at_zero);
 
-  const Result<ErrorPolynomials> A = ErrorPolynomials::of(chain, order, std::array{tool_offset_mm});
+  const Result<ErrorPolynomials> A = ErrorPolynomials::of(chain, order, tool_offset_mm);
   ABBE_TRY(A);
 
   std::vector<CombinedRow> plain = combined_rows(*at_zero), rows = combined_rows(*A);
@@ -139,7 +138,6 @@ Result<EquivalentModel> EquivalentModel::of(const KinematicChain& chain, int ord
   EquivalentModel model;
   model.chain_ = chain;
   model.order_ = order;
-  model.coefficient_names_.assign(A->names().begin(), A->names().end());
   model.W_.resize(static_cast<Eigen::Index>(plain.size()),
                   static_cast<Eigen::Index>(A->names().size()));
 
@@ -162,40 +160,6 @@ Eigen::Matrix3Xd EquivalentModel::X(const Vector3& p_mm) const {
     }
   }
   return X;
-}
-
-Result<std::size_t> observable_combinations(const KinematicChain& chain, int order,
-                                            std::span<const Vector3> tool_offsets_mm) {
-  double longest_mm = 1.0;
-  for (const Vector3& t : tool_offsets_mm) {
-    longest_mm = std::max(longest_mm, t.norm());
-  }
-
-  // Offsets are scaled to at most 1 so that the rows of W have similar size; the unit of length
-  // does not change their rank.
-  std::vector<Vector3> scaled(tool_offsets_mm.begin(), tool_offsets_mm.end());
-  for (Vector3& t : scaled) {
-    t /= longest_mm;
-  }
-
-  const Result<ErrorPolynomials> A = ErrorPolynomials::of(chain, order, scaled);
-  ABBE_TRY(A);
-
-  const std::vector<CombinedRow> rows = combined_rows(*A);
-  Eigen::MatrixXd W(static_cast<Eigen::Index>(rows.size()),
-                    static_cast<Eigen::Index>(A->names().size()));
-
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    W.row(static_cast<Eigen::Index>(i)) = rows[i].w;
-  }
-
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(W);
-  // Pivots have either the size of the differences between offsets or rounding level (1e-15). Styli
-  // whose directions differ by less than 1e-9 count as parallel.
-  constexpr double kZero = 1e-9;
-  qr.setThreshold(kZero);
-
-  return static_cast<std::size_t>(qr.rank());
 }
 
 }  // namespace abbe::calib

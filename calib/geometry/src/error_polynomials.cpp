@@ -17,13 +17,13 @@ double handedness(std::size_t a, std::size_t b) {
 /// Collects names and terms coefficient by coefficient.
 struct Builder {
   const KinematicChain& chain;
-  std::span<const Vector3> tools_mm;
+  Vector3 tool_mm;
   std::vector<std::string> names{};
   std::vector<PolynomialTerm> terms{};
 
-  void add(std::size_t tool, std::size_t component, const Monomial& m, double factor) {
+  void add(std::size_t component, const Monomial& m, double factor) {
     if (factor != 0.0) {
-      terms.push_back({3 * tool + component, names.size() - 1, m, factor});
+      terms.push_back({component, names.size() - 1, m, factor});
     }
   }
 
@@ -31,20 +31,18 @@ struct Builder {
   ///     m e_direction x (sum of q_b e_b over the axes b at `first_place` and nearer to the tool
   ///                      + tool offset)
   void add_rotation(std::size_t direction, std::size_t first_place, const Monomial& m) {
-    for (std::size_t tool = 0; tool < tools_mm.size(); ++tool) {
-      for (std::size_t b = 0; b < 3; ++b) {
-        if (b == direction) {
-          continue;
-        }
-        const std::size_t component = 3 - direction - b;
-        const double sign = handedness(direction, b);
-        if (chain.place(kAllAxes[b]) >= first_place) {
-          Monomial with_arm = m;
-          ++with_arm.exponent[b];
-          add(tool, component, with_arm, sign);
-        }
-        add(tool, component, m, sign * tools_mm[tool](static_cast<Eigen::Index>(b)));
+    for (std::size_t b = 0; b < 3; ++b) {
+      if (b == direction) {
+        continue;
       }
+      const std::size_t component = 3 - direction - b;
+      const double sign = handedness(direction, b);
+      if (chain.place(kAllAxes[b]) >= first_place) {
+        Monomial with_arm = m;
+        ++with_arm.exponent[b];
+        add(component, with_arm, sign);
+      }
+      add(component, m, sign * tool_mm(static_cast<Eigen::Index>(b)));
     }
   }
 
@@ -56,10 +54,8 @@ struct Builder {
       m.exponent[index(axis)] = k;
       if (rotation) {
         add_rotation(direction, chain.place(axis) + 1, m);
-        continue;
-      }
-      for (std::size_t tool = 0; tool < tools_mm.size(); ++tool) {
-        add(tool, direction, m, 1.0);
+      } else {
+        add(direction, m, 1.0);
       }
     }
   }
@@ -86,28 +82,18 @@ double Monomial::at(const Vector3& p_mm) const {
   return value;
 }
 
-Result<ErrorPolynomials> ErrorPolynomials::of(const KinematicChain& chain, int order) {
-  return of(chain, order, std::array{Vector3(Vector3::Zero())});
-}
-
 Result<ErrorPolynomials> ErrorPolynomials::of(const KinematicChain& chain, int order,
-                                              std::span<const Vector3> tool_offsets_mm) {
+                                              const Vector3& tool_offset_mm) {
   if (order < kLeastOrder || order > kMostOrder) {
     return failure(ErrorCode::BadInput, message("error polynomials: order ", order, ", must be ",
                                                 kLeastOrder, " to ", kMostOrder));
   }
 
-  if (tool_offsets_mm.empty()) {
-    return failure(ErrorCode::BadInput, "error polynomials: no tool offset");
+  if (!tool_offset_mm.allFinite()) {
+    return failure(ErrorCode::NotFinite, "error polynomials: the tool offset is not a number");
   }
 
-  for (const Vector3& t : tool_offsets_mm) {
-    if (!t.allFinite()) {
-      return failure(ErrorCode::NotFinite, "error polynomials: a tool offset is not a number");
-    }
-  }
-
-  Builder build{chain, tool_offsets_mm};
+  Builder build{chain, tool_offset_mm};
   for (const Axis axis : kAllAxes) {
     for (const bool rotation : {false, true}) {
       for (std::size_t direction = 0; direction < 3; ++direction) {
@@ -122,16 +108,14 @@ Result<ErrorPolynomials> ErrorPolynomials::of(const KinematicChain& chain, int o
   ErrorPolynomials result;
   result.names_ = std::move(build.names);
   result.terms_ = std::move(build.terms);
-  result.rows_ = 3 * tool_offsets_mm.size();
 
   return result;
 }
 
-Eigen::MatrixXd ErrorPolynomials::A(const Vector3& p_mm) const {
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_),
-                                            static_cast<Eigen::Index>(names_.size()));
+Eigen::Matrix3Xd ErrorPolynomials::A(const Vector3& p_mm) const {
+  Eigen::Matrix3Xd A = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(names_.size()));
   for (const PolynomialTerm& t : terms_) {
-    A(static_cast<Eigen::Index>(t.row), static_cast<Eigen::Index>(t.coefficient)) +=
+    A(static_cast<Eigen::Index>(t.component), static_cast<Eigen::Index>(t.coefficient)) +=
         t.factor * t.monomial.at(p_mm);
   }
   return A;

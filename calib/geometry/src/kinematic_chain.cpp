@@ -139,7 +139,6 @@ Result<KinematicChain> KinematicChain::parse(std::string_view chain) {
       }
     }
     order.push_back(*axis);
-    result.primed_[index(*axis)] = token.primed;
   }
 
   if (order.size() != 3) {

@@ -80,18 +80,15 @@ void fill_surface(GridSearch& grid, const std::vector<HeldOut>& folds) {
   const auto rows = static_cast<Eigen::Index>(grid.lambda.size()),
              columns = static_cast<Eigen::Index>(grid.gamma.size());
   grid.error = Eigen::MatrixXd::Constant(rows, columns, kMissing);
-  grid.standard_error = grid.error;
 
   for (std::size_t g = 0; g < grid.gamma.size(); ++g) {
     const std::size_t reach = common_reach(grid.paths[g], folds, g);
     for (std::size_t l = 0; l < reach; ++l) {
-      Moments cell;
+      MeanError cell;
       for (const HeldOut& fold : folds) {
         cell.add(fold.error[g][l]);
       }
-      const auto row = static_cast<Eigen::Index>(l), column = static_cast<Eigen::Index>(g);
-      grid.error(row, column) = cell.mean;
-      grid.standard_error(row, column) = std::sqrt(cell.squares / (cell.count - 1) / cell.count);
+      grid.error(static_cast<Eigen::Index>(l), static_cast<Eigen::Index>(g)) = cell.mean;
     }
   }
 }
@@ -147,7 +144,6 @@ Result<GridSearch> search(const GramProblem& problem, const std::vector<Penalty>
   }
 
   grid.lambda = lambda.values;
-  grid.null_error = problem.y_rms * problem.y_rms;
   grid.sweeps = count_sweeps(grid.paths, judged);
   fill_surface(grid, judged);
 
@@ -178,20 +174,6 @@ Result<GridSearch> grid_search(const Eigen::MatrixXd& X, const Eigen::VectorXd& 
   return gram_problem(X, y).and_then([&](const GramProblem& problem) {
     return search(problem, *wanted, folds, options, parallel_for);
   });
-}
-
-Result<CrossValidation> cross_validate(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
-                                       const Penalty& penalty, const Folds& folds,
-                                       const PathOptions& options,
-                                       const ParallelFor& parallel_for) {
-  return grid_search(X, y, penalty.kind, {penalty.gamma}, folds, options, parallel_for)
-      .map([](GridSearch&& grid) {
-        return CrossValidation{.path = std::move(grid.paths.front()),
-                               .error = grid.error.col(0),
-                               .standard_error = grid.standard_error.col(0),
-                               .null_error = grid.null_error,
-                               .best = grid.best.lambda};
-      });
 }
 
 std::vector<double> equally_spaced(double first, double last, int count) {

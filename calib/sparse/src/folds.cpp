@@ -10,27 +10,18 @@
 namespace abbe::calib::sparse {
 namespace {
 
-/// Fold of each item, in random order. Fisher-Yates shuffle, written out because std::shuffle gives
+/// Fold of each row, in random order. Fisher-Yates shuffle, written out because std::shuffle gives
 /// different results with different standard libraries.
-std::vector<int> random_assignment(std::size_t items, int folds, std::uint64_t seed) {
-  std::vector<int> fold(items);
-  for (std::size_t i = 0; i < items; ++i) {
+std::vector<int> random_assignment(std::size_t rows, int folds, std::uint64_t seed) {
+  std::vector<int> fold(rows);
+  for (std::size_t i = 0; i < rows; ++i) {
     fold[i] = static_cast<int>(i % static_cast<std::size_t>(folds));
   }
   std::mt19937_64 random(seed);
-  for (std::size_t i = items; i > 1; --i) {
+  for (std::size_t i = rows; i > 1; --i) {
     std::swap(fold[i - 1], fold[random() % i]);
   }
   return fold;
-}
-
-Result<void> check_counts(std::string_view what, std::size_t items, int folds) {
-  if (folds < 2 || items < static_cast<std::size_t>(folds)) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("split ", items, " ", what, " into ", folds,
-                           " folds: needs at least 2 folds and as many ", what, " as folds"));
-  }
-  return {};
 }
 
 std::vector<int> sorted_distinct(std::span<const int> labels) {
@@ -93,22 +84,12 @@ Result<Folds> parse_folds(std::string_view text) {
 }
 
 Result<Folds> random_folds(std::size_t rows, int folds, std::uint64_t seed) {
-  return check_counts("rows", rows, folds).map([&] {
-    return Folds{.of_row = random_assignment(rows, folds, seed), .count = folds};
-  });
-}
-
-Result<Folds> group_folds(std::span<const int> group_of_row, int folds, std::uint64_t seed) {
-  const std::vector<int> groups = sorted_distinct(group_of_row);
-  return check_counts("groups", groups.size(), folds).map([&] {
-    const std::vector<int> fold_of_group = random_assignment(groups.size(), folds, seed);
-    Folds out{.of_row = {}, .count = folds};
-    out.of_row.reserve(group_of_row.size());
-    for (const int group : group_of_row) {
-      out.of_row.push_back(fold_of_group[static_cast<std::size_t>(rank_in(groups, group))]);
-    }
-    return out;
-  });
+  if (folds < 2 || rows < static_cast<std::size_t>(folds)) {
+    return failure(ErrorCode::TooFewObservations,
+                   message("split ", rows, " rows into ", folds,
+                           " folds: needs at least 2 folds and as many rows as folds"));
+  }
+  return Folds{.of_row = random_assignment(rows, folds, seed), .count = folds};
 }
 
 }  // namespace abbe::calib::sparse

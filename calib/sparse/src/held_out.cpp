@@ -10,9 +10,8 @@ namespace {
 
 using Rows = std::vector<Eigen::Index>;
 
-Moments moments_of(const Eigen::Ref<const Eigen::VectorXd>& values) {
-  const double mean = values.mean();
-  return {static_cast<double>(values.size()), mean, (values.array() - mean).square().sum()};
+MeanError mean_of(const Eigen::Ref<const Eigen::VectorXd>& values) {
+  return {static_cast<double>(values.size()), values.mean()};
 }
 
 /// X with the columns that `design` keeps, shifted and scaled with the means and scales of
@@ -22,23 +21,21 @@ Eigen::MatrixXd like(const Standardised& design, const Eigen::MatrixXd& X) {
          design.scale.cwiseInverse().asDiagonal();
 }
 
-std::vector<Moments> errors_of(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
-                               const Eigen::MatrixXd& b) {
+std::vector<MeanError> errors_of(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                                 const Eigen::MatrixXd& b) {
   const Eigen::MatrixXd squared = ((X * b).colwise() - y).array().square();
-  std::vector<Moments> errors;
+  std::vector<MeanError> errors;
   for (Eigen::Index k = 0; k < b.cols(); ++k) {
-    errors.push_back(moments_of(squared.col(k)));
+    errors.push_back(mean_of(squared.col(k)));
   }
   return errors;
 }
 
 }  // namespace
 
-void Moments::add(const Moments& more) {
+void MeanError::add(const MeanError& more) {
   const double total = count + more.count;
-  const double step = more.mean - mean;
-  mean += step * more.count / total;
-  squares += more.squares + step * step * count * more.count / total;
+  mean += (more.mean - mean) * more.count / total;
   count = total;
 }
 

@@ -9,18 +9,16 @@
 
 namespace abbe::calib::sparse {
 
-/// Count, mean and sum of squared deviations from the mean of a set of values. add() combines the
-/// moments of two sets without cancellation of digits.
-struct Moments {
+/// Number and mean of squared errors. add() gives the mean of both sets.
+struct MeanError {
   double count = 0.0;
   double mean = 0.0;
-  double squares = 0.0;
 
-  void add(const Moments& more);
+  void add(const MeanError& more);
 };
 
 struct HeldOut {
-  std::vector<std::vector<Moments>> error;  ///< by penalty, then by lambda it reached
+  std::vector<std::vector<MeanError>> error;  ///< by penalty, then by lambda it reached
   long sweeps = 0;
 };
 

@@ -14,8 +14,6 @@
 namespace abbe::calib::sparse {
 namespace {
 
-constexpr int kDefaultCount = 100;
-
 /// Default ratio of the smallest lambda to lambda_max. For n > p (n rows, p columns) the solution
 /// at a thousandth of lambda_max is close to least squares; for n <= p solutions at small lambda,
 /// with many nonzero coefficients, are not meaningful.
@@ -58,18 +56,15 @@ Result<void> check(const PathOptions& options) {
   return check_lambda(options.lambda);
 }
 
-std::vector<double> default_lambda(const GramProblem& problem, int count, double ratio) {
+LambdaList lambda_list(const GramProblem& problem, const PathOptions& options) {
+  if (!options.lambda.empty()) return {options.lambda, false};
+  constexpr int kCount = 100;
   const double largest = problem.lambda_max();
-  std::vector<double> lambda = log_spaced(largest, ratio * largest, count);
+  std::vector<double> lambda = log_spaced(largest, default_ratio(problem) * largest, kCount);
   // log_spaced() computes exp(log(largest)), which may be smaller than `largest` by rounding; the
   // first solution would then not be empty.
   lambda.front() = largest;
-  return lambda;
-}
-
-LambdaList lambda_list(const GramProblem& problem, const PathOptions& options) {
-  if (!options.lambda.empty()) return {options.lambda, false};
-  return {default_lambda(problem, kDefaultCount, default_ratio(problem)), true};
+  return {std::move(lambda), true};
 }
 
 PathTask path_task(const GramProblem& problem, const Penalty& penalty, const LambdaList& lambda,
@@ -104,18 +99,6 @@ Path to_path(const GramProblem& problem, const PathTask& task, SolvedPath solved
   return path;
 }
 
-Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
-                                           int count, std::optional<double> ratio) {
-  if (count < 2 || (ratio && !(*ratio > 0 && *ratio < 1))) {
-    return failure(ErrorCode::BadInput,
-                   message("default lambda: ", count, " values down to ", ratio.value_or(0.001),
-                           " of the largest; needs at least 2 values and a ratio between 0 and 1"));
-  }
-  return gram_problem(X, y).map([&](const GramProblem& problem) {
-    return default_lambda(problem, count, ratio.value_or(default_ratio(problem)));
-  });
-}
-
 Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Penalty& penalty,
                       const PathOptions& options) {
   ABBE_TRY(check(penalty));
@@ -125,11 +108,6 @@ Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const 
     const std::array task{path_task(problem, penalty, lambda, options)};
     return to_path(problem, task[0], std::move(solve_paths(problem, task)[0]));
   });
-}
-
-Eigen::VectorXd predict(const Path& path, const Eigen::MatrixXd& X, Eigen::Index k) {
-  const auto beta = path.coefficients.col(k);
-  return (X * beta.tail(X.cols())).array() + beta(0);
 }
 
 }  // namespace abbe::calib::sparse

@@ -16,7 +16,6 @@ struct LambdaList {
   bool first_is_empty = false;
 };
 [[nodiscard]] LambdaList lambda_list(const GramProblem&, const PathOptions&);
-[[nodiscard]] std::vector<double> default_lambda(const GramProblem&, int count, double ratio);
 
 /// The returned task refers to `lambda`, which must outlive the task.
 [[nodiscard]] PathTask path_task(const GramProblem&, const Penalty&, const LambdaList& lambda,

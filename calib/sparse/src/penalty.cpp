@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "abbe/calib/internal/base/message.hpp"
-#include "shrinkage.hpp"
 
 namespace abbe::calib::sparse {
 namespace {
@@ -27,38 +26,6 @@ Result<void> check(const Penalty& penalty) {
                            penalty.gamma));
   }
   return {};
-}
-
-double value(const Penalty& penalty, double lambda, double magnitude) {
-  const double t = magnitude, l = lambda, g = penalty.gamma;
-  switch (penalty.kind) {
-    case PenaltyKind::Mcp:
-      return t <= g * l ? l * t - t * t / (2 * g) : g * l * l / 2;
-    case PenaltyKind::Scad:
-      if (t <= l) return l * t;
-      return t <= g * l ? (2 * g * l * t - t * t - l * l) / (2 * (g - 1)) : l * l * (g + 1) / 2;
-    case PenaltyKind::Lasso:
-      break;
-  }
-  return l * t;
-}
-
-double derivative(const Penalty& penalty, double lambda, double magnitude) {
-  const double t = magnitude, l = lambda, g = penalty.gamma;
-  switch (penalty.kind) {
-    case PenaltyKind::Mcp:
-      return t <= g * l ? l - t / g : 0.0;
-    case PenaltyKind::Scad:
-      if (t <= l) return l;
-      return t <= g * l ? (g * l - t) / (g - 1) : 0.0;
-    case PenaltyKind::Lasso:
-      break;
-  }
-  return l;
-}
-
-double minimiser(const Penalty& penalty, double lambda, double z) {
-  return shrinkage(penalty, lambda)(z);
 }
 
 double concavity(const Penalty& penalty) {

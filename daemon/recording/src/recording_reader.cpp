@@ -211,9 +211,6 @@ std::string RecordingReader::damage() const {
 std::uint64_t RecordingReader::message_count() const noexcept {
   return state_->contents.messages;
 }
-std::uint64_t RecordingReader::size_bytes() const noexcept {
-  return state_->file->size();
-}
 
 std::optional<std::pair<protocol::HostTime, protocol::HostTime>> RecordingReader::time_range()
     const noexcept {

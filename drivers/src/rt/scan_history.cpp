@@ -32,10 +32,6 @@ DeviceTime ScanHistory::instant(std::int64_t clock_count) const ABBE_RT {
   return DeviceTime{nanoseconds{std::llround(ns)}};
 }
 
-nanoseconds ScanHistory::clock_period() const ABBE_RT {
-  return nanoseconds{std::llround(1e9 * period_s_)};
-}
-
 std::uint64_t ScanHistory::first_after(DeviceTime t) const ABBE_RT {
   std::uint64_t low = begin_;
   for (std::uint64_t high = end_; low < high;) {

@@ -62,8 +62,8 @@ void TrackerDevice::wait(std::chrono::nanoseconds at_most) {
   show();
 }
 
-/// Stops the session within leave_within, measured by the steady clock: a SteppedTime does not
-/// advance here, so the session's own time-outs would never end the loop.
+/// Stops the session within leave_within, measured by the steady clock: the stepped host time of a
+/// test does not advance here, so the session's own time-outs would never end the loop.
 void TrackerDevice::restore_settings() {
   constexpr auto kLook = std::chrono::milliseconds{20};
   const auto until = std::chrono::steady_clock::now() + time_.wall(options_.session.leave_within);

@@ -74,16 +74,6 @@ std::uint8_t encode(const Debounce& debounce) ABBE_RT {
   return static_cast<std::uint8_t>(code);
 }
 
-Debounce decode_debounce(std::uint8_t code) ABBE_RT {
-  Debounce debounce;
-  debounce.enabled = (code & kDebounceOn) != 0;
-  debounce.falling = (code & kFalling) != 0;
-  if (!debounce.enabled) return debounce;
-  debounce.time_code = code & kTimeBits;
-  debounce.trigger_before_stable = (code & kBeforeStable) != 0;
-  return debounce;
-}
-
 std::array<usb::Setup, kChannelWrites> channel_writes(std::uint8_t channel,
                                                       const CounterSetup& setup,
                                                       const Debounce& phases,

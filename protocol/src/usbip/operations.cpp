@@ -109,12 +109,6 @@ tl::expected<OpHead, OpError> decode_op_head(std::span<const std::byte> bytes) A
   return head;
 }
 
-std::size_t encode_device_list_request(std::span<std::byte> out) ABBE_RT {
-  ByteWriter writer{out};
-  put(writer, OpHead{.code = OpCode::DeviceListRequest});
-  return bytes_in(writer);
-}
-
 std::size_t encode_import_request(const BusId& bus_id, std::span<std::byte> out) ABBE_RT {
   ByteWriter writer{out};
   put(writer, OpHead{.code = OpCode::ImportRequest});
@@ -173,33 +167,6 @@ bool DeviceListWriter::add(const ExportedDevice& device,
   if (!writer.ok() || device.interfaces != interfaces.size()) return false;
   size_ += writer.size();
   return true;
-}
-
-tl::expected<DeviceListView, OpError> DeviceListView::parse(
-    std::span<const std::byte> bytes) ABBE_RT {
-  const auto head = expect_head(bytes, OpCode::DeviceListReply);
-  if (!head) return tl::unexpected{head.error()};
-  ByteReader in{bytes};
-  in.skip(kOpHeadSize);
-  const auto count = in.big<std::uint32_t>();
-  if (!in.ok()) return tl::unexpected{OpError::Truncated};
-  const auto devices = bytes.subspan(in.position());
-  // A device has 312 bytes, followed by its interfaces. If the bytes end before `count` devices
-  // were read, the loop ends early.
-  for (std::uint32_t i = 0; i < count && in.ok(); ++i)
-    in.skip(kExportedInterfaceSize * take_device(in).interfaces);
-  if (!in.ok()) return tl::unexpected{OpError::Truncated};
-  return DeviceListView{devices, count};
-}
-
-std::optional<ExportedDevice> DeviceListView::next() ABBE_RT {
-  if (left_ == 0) return std::nullopt;
-  --left_;
-  ByteReader in{rest_};
-  const auto device = take_device(in);
-  in.skip(kExportedInterfaceSize * device.interfaces);
-  rest_ = rest_.subspan(in.position());
-  return device;
 }
 
 }  // namespace abbe::protocol::usbip

@@ -5,6 +5,7 @@
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
 #include "rt_guards.hpp"
+#include "stepped_time.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -59,7 +60,7 @@ TEST(EncoderReceiverRt, MakesNoSystemCall) {
 
 /// The whole of receive(): raw blocks, samples and status too. wait() stands outside the guards.
 TEST(EncoderDeviceRt, ReceiveTakesNoMemory) {
-  SteppedTime time;
+  tests::SteppedTime time;
   tests::EncoderPeer peer{
       std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
   EncoderDeviceOptions options;

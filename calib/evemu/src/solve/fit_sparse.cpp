@@ -4,8 +4,8 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/evemu/solve/fit_coefficients.hpp"
+#include "abbe/calib/internal/sparse/convexity.hpp"
 #include "abbe/calib/internal/sparse/cross_validation.hpp"
-#include "abbe/calib/internal/sparse/optimality.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
 #include "abbe/result/try.hpp"
 

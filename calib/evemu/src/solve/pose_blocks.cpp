@@ -92,8 +92,7 @@ Result<std::vector<estimation::Block>> pose_blocks(const Observations& o,
                             .L = Eigen::MatrixXd::Zero(rows, 6),
                             .u_nuisance = std::vector<double>(6, estimation::kNoPrior),
                             .y = Eigen::VectorXd::Zero(rows),
-                            .covariance = Eigen::MatrixXd::Zero(rows, rows),
-                            .group = blocks.size()};
+                            .covariance = Eigen::MatrixXd::Zero(rows, rows)};
     fill_pose_block(block, o, p, *pose, design);
     block.A.rightCols(of_array.cols()) =
         of_array.middleRows(static_cast<Eigen::Index>(3 * p.first), rows);

@@ -182,10 +182,6 @@ void set_bar_frame(PointsOfInterest& result, const std::vector<Derived>& O, cons
 
 }  // namespace
 
-Eigen::MatrixXd PointsOfInterest::covariance_bar_m2(double u_m) const {
-  return u_m * u_m * dO_bar_dtouch * dO_bar_dtouch.transpose();
-}
-
 Result<PointsOfInterest> points_of_interest(const BarTouches& touches, const Matrix3& axes) {
   const Result<BarFeatures> fitted = fit_features(touches, axes);
   ABBE_TRY(fitted);

@@ -43,12 +43,4 @@ PathFrame path_frame(const Vector3& direction, const Vector3& beam_m, const Nois
   return frame;
 }
 
-Matrix3 sample_covariance_m2(const Vector3& p_tracker_m, const Noise& noise) {
-  const Vector3 er = p_tracker_m.normalized();
-  const Matrix3 along = er * er.transpose();
-  const double across_beam_m = noise.sigma_angle_rad * p_tracker_m.norm();
-  return noise.sigma_range_m * noise.sigma_range_m * along +
-         across_beam_m * across_beam_m * (Matrix3::Identity() - along);
-}
-
 }  // namespace abbe::calib::otf

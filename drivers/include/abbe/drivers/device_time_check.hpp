@@ -41,15 +41,13 @@ class DeviceTimeCheck {
     return Verdict::Jumped;
   }
 
-  /// Points in a row that agree with each other and not with the time base.
-  [[nodiscard]] int agreeing() const ABBE_RT { return agreeing_; }
   [[nodiscard]] bool known() const ABBE_RT { return known_; }
   [[nodiscard]] protocol::DeviceTime last() const ABBE_RT { return last_; }
   void reset() ABBE_RT { *this = {}; }
 
  private:
   bool known_ = false;
-  int agreeing_ = 0;
+  int agreeing_ = 0;  ///< points in a row that agree with each other and not with the time base
   protocol::DeviceTime last_{};       ///< of the last point that was not refused
   protocol::DeviceTime candidate_{};  ///< of the last point that was refused
 };

@@ -102,7 +102,6 @@ class CounterCard final : public ExportedCard {
   void fail_controls(std::size_t count) { failing_controls_ = count; }
 
   [[nodiscard]] const CounterCardOptions& options() const { return options_; }
-  [[nodiscard]] std::uint64_t scans_made() const { return scans_made_; }
 
  private:
   struct Counter {
@@ -149,7 +148,6 @@ class CounterCard final : public ExportedCard {
   bool overrun_ = false;
   HostTime pacer_began_{};
   std::uint64_t next_scan_ = 0;
-  std::uint64_t scans_made_ = 0;
   std::vector<std::uint16_t> timer_words_;
   std::optional<HostTime> timer_began_;
   std::int64_t clock_jump_ = 0;

@@ -42,7 +42,6 @@ class UsbipServer {
   }
   /// The simulated card. Precondition: the exported card is simulated.
   [[nodiscard]] CounterCard& card() { return *simulated_; }
-  [[nodiscard]] std::size_t waiting_requests() const { return requests_.size(); }
 
   /// No effect with a recorded card.
   void inject(const Fault& fault, HostTime now);

@@ -101,7 +101,6 @@ class RecordingReader {
   [[nodiscard]] MetadataCheck configuration_check() const noexcept;
 
   [[nodiscard]] std::uint64_t message_count() const noexcept;
-  [[nodiscard]] std::uint64_t size_bytes() const noexcept;
   /// Times at which the hub took the first and the last message; nullopt if there are no messages.
   [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range()
       const noexcept;

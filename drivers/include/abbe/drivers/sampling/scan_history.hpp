@@ -38,7 +38,6 @@ class ScanHistory {
 
   /// Instant of a clock count: the middle of the clock period with this count.
   [[nodiscard]] protocol::DeviceTime instant(std::int64_t clock_count) const ABBE_RT;
-  [[nodiscard]] std::chrono::nanoseconds clock_period() const ABBE_RT;
   [[nodiscard]] double clock_period_s() const ABBE_RT { return period_s_; }
 
   /// Axis positions at `instant`; `u_position` contains only the uncertainty of the interpolation.

@@ -75,23 +75,8 @@ struct Heartbeat {
 [[nodiscard]] CanFrame encode_heartbeat(NodeId node, NodeState state) ABBE_RT;
 [[nodiscard]] std::optional<Heartbeat> decode_heartbeat(const CanFrame& frame) ABBE_RT;
 
-/// Emergency error codes [CiA 301]. A device may send other codes of the same class (first digit).
-enum class EmergencyCode : std::uint16_t {
-  Reset = 0x0000,
-  Generic = 0x1000,
-  Current = 0x2000,
-  Voltage = 0x3000,
-  Temperature = 0x4000,
-  Hardware = 0x5000,
-  Software = 0x6000,
-  CanOverrun = 0x8110,
-  ErrorPassive = 0x8120,
-  HeartbeatLost = 0x8130,
-  RecoveredFromBusOff = 0x8140,
-  IdCollision = 0x8150,
-  PdoLength = 0x8210,
-};
-/// The class of an emergency error code in words: "communication: CAN overrun", "device specific".
+/// The class of an emergency error code [CiA 301] in words: "communication: CAN overrun", "device
+/// specific".
 /// Static storage.
 [[nodiscard]] const char* emergency_text(std::uint16_t code) noexcept;
 /// Bits of the error register 1001h [CiA 301].

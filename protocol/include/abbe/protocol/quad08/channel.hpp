@@ -42,10 +42,8 @@ struct Debounce {
   bool falling = false;
   /// true: the first edge counts, then further edges are ignored for the time of `time_code`
   bool trigger_before_stable = false;
-  friend bool operator==(const Debounce&, const Debounce&) = default;
 };
 [[nodiscard]] std::uint8_t encode(const Debounce& debounce) ABBE_RT;
-[[nodiscard]] Debounce decode_debounce(std::uint8_t code) ABBE_RT;
 inline constexpr std::array<double, 16> kDebounce_s{
     500e-9, 1.5e-6, 3.5e-6, 7.5e-6, 15.5e-6, 31.5e-6, 63.5e-6, 127.5e-6,
     100e-6, 300e-6, 700e-6, 1.5e-3, 3.1e-3,  6.3e-3,  12.7e-3, 25.5e-3};

@@ -7,7 +7,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -105,7 +104,6 @@ struct OpHead {
 
 inline constexpr std::size_t kOpHeadSize = 8;
 inline constexpr std::size_t kExportedDeviceSize = 312;
-inline constexpr std::size_t kExportedInterfaceSize = 4;
 inline constexpr std::size_t kImportRequestSize = kOpHeadSize + 32;
 inline constexpr std::size_t kImportReplySize = kOpHeadSize + kExportedDeviceSize;
 
@@ -114,7 +112,6 @@ inline constexpr std::size_t kImportReplySize = kOpHeadSize + kExportedDeviceSiz
     std::span<const std::byte> bytes) ABBE_RT;
 
 // Each encoder returns the number of bytes written, 0 if `out` is too small.
-std::size_t encode_device_list_request(std::span<std::byte> out) ABBE_RT;
 std::size_t encode_import_request(const BusId& bus_id, std::span<std::byte> out) ABBE_RT;
 /// Encodes the reply to an import request. A refusal (`device` null) consists of the head only.
 std::size_t encode_import_reply(OpStatus status, const ExportedDevice* device,
@@ -141,25 +138,6 @@ class DeviceListWriter {
  private:
   std::span<std::byte> out_;
   std::size_t size_ = 0;
-};
-
-/// Reads the devices of a complete device list one by one. The bytes must outlive the view.
-class DeviceListView {
- public:
-  /// Error Truncated until all announced devices have arrived.
-  [[nodiscard]] static tl::expected<DeviceListView, OpError> parse(
-      std::span<const std::byte> bytes) ABBE_RT;
-  [[nodiscard]] std::uint32_t count() const ABBE_RT { return count_; }
-  /// The next device without its interfaces; nullopt after the last one.
-  [[nodiscard]] std::optional<ExportedDevice> next() ABBE_RT;
-
- private:
-  DeviceListView(std::span<const std::byte> devices, std::uint32_t count) ABBE_RT : rest_(devices),
-                                                                                    count_(count),
-                                                                                    left_(count) {}
-  std::span<const std::byte> rest_;
-  std::uint32_t count_;
-  std::uint32_t left_;
 };
 
 }  // namespace abbe::protocol::usbip

@@ -1,8 +1,7 @@
 #pragma once
-/// Correction of lengths to the reference temperature of 20 C [ISO 1]. Above 20 C the graduation of
-/// a scale is too wide: the axis has moved farther than it reads. Above 20 C a part is too long.
-/// Scale and part are corrected separately, each with its own temperature and coefficient. Pure;
-/// any thread.
+/// Thermal expansion relative to the reference temperature of 20 C [ISO 1], and the correction of
+/// scales. Above 20 C the graduation of a scale is too wide: the axis has moved farther than it
+/// reads. Pure; any thread.
 
 namespace abbe::calib {
 
@@ -35,17 +34,9 @@ struct UncertainLength {
   double u_m = 0.0;  ///< of the thermal correction alone
 };
 
-/// Length at 20 C of a part with the length L_T at its temperature T: L20 = L_T / expansion factor.
-[[nodiscard]] UncertainLength length_at_reference(double length_m, const Expansion& part) noexcept;
-
 /// True position of an axis at the reading `reading_m`. `fixed_m` is the reading at the point where
 /// the scale is fixed to the machine; the scale expands from this point.
 [[nodiscard]] UncertainLength true_position(double reading_m, double fixed_m,
                                             const Expansion& scale) noexcept;
-
-/// Length at 20 C of a part that is measured with a scale, each at its own temperature:
-///     L20 = reading * expansion_factor(scale) / expansion_factor(part)
-[[nodiscard]] UncertainLength length_at_reference(double reading_m, const Expansion& scale,
-                                                  const Expansion& part) noexcept;
 
 }  // namespace abbe::calib

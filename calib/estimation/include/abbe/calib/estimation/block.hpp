@@ -22,9 +22,6 @@ struct Block {
   Eigen::VectorXd y;
   /// covariance of y: rows x rows, or one column with the variances of independent rows
   Eigen::MatrixXd covariance;
-  /// blocks with the same number are left out together in cross-validation; the noise of different
-  /// groups is independent
-  std::size_t group = 0;
 };
 
 }  // namespace abbe::calib::estimation

@@ -10,7 +10,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <map>
 #include <span>
 #include <vector>
 
@@ -73,24 +72,6 @@ class Information {
   std::size_t unknowns_ = 0, rows_ = 0;
   std::vector<double> values_;  ///< [R | z] by rows
   double rest_ = 0.0;
-};
-
-/// Information of each group of blocks (Block::group). Noise is independent between groups, so the
-/// information of all groups but one is a sum, and no observation is read again.
-class InformationByGroup {
- public:
-  explicit InformationByGroup(std::size_t unknowns) : unknowns_(unknowns) {}
-
-  [[nodiscard]] Result<void> add(const Block&);
-  [[nodiscard]] std::vector<std::size_t> groups() const;
-  /// Information without observations if no block of this group was added.
-  [[nodiscard]] Information of(std::size_t group) const;
-  [[nodiscard]] Information all() const;
-  [[nodiscard]] Information without(std::size_t group) const;
-
- private:
-  std::size_t unknowns_ = 0;
-  std::map<std::size_t, Information> parts_;
 };
 
 }  // namespace abbe::calib::estimation

@@ -27,8 +27,6 @@ class RowBatch {
 
   [[nodiscard]] std::size_t size() const { return count_; }
   [[nodiscard]] bool full() const { return count_ == kCapacity; }
-  /// Number of values of a row.
-  [[nodiscard]] std::size_t width() const { return width_; }
 
   /// `root_weight`: 1 / standard deviation of y. The batch must not be full.
   void append(std::span<const RowEntry> row, double y, double root_weight) {

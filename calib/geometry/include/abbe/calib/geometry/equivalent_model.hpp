@@ -8,7 +8,7 @@
 /// With one tool offset W has full row rank, so X is the only solution of A = X W. The columns of X
 /// are single monomials (for a rotation with two arms: one in each of two components). Names as in
 /// [Li OMM] Table 3: a row with one coefficient has the name of that coefficient; a merged row is
-/// k_eq<component><n>, numbered within the component by decreasing x > y > z > 1. Sign: a single
+/// k_eqX1, k_eqX2, ..., numbered within the component X by decreasing x > y > z > 1. Sign: a single
 /// coefficient has the factor +1; in a merged row the translations have the factor +1. Rows are in
 /// alphabetical order. Lengths in mm.
 
@@ -40,9 +40,6 @@ class EquivalentModel {
   [[nodiscard]] int order() const { return order_; }
   [[nodiscard]] std::size_t size() const { return names_.size(); }  ///< 14 (order + 1) - 11
   [[nodiscard]] std::span<const std::string> names() const { return names_; }
-  [[nodiscard]] std::span<const std::string> coefficient_names() const {
-    return coefficient_names_;
-  }  ///< names of K
   [[nodiscard]] const Eigen::MatrixXd& W() const { return W_; }
   [[nodiscard]] std::span<const PolynomialShare> shares(std::size_t column) const {
     return shares_[column];
@@ -54,14 +51,9 @@ class EquivalentModel {
  private:
   KinematicChain chain_;
   int order_ = 0;
-  std::vector<std::string> names_, coefficient_names_;
+  std::vector<std::string> names_;
   Eigen::MatrixXd W_;
   std::vector<std::vector<PolynomialShare>> shares_;
 };
-
-/// Number of combinations that measurements with all these tools (mm) can distinguish: for order 3,
-/// 45 with one tool, 56 with two tools that are not parallel, 60 with three or more.
-[[nodiscard]] Result<std::size_t> observable_combinations(const KinematicChain&, int order,
-                                                          std::span<const Vector3> tool_offsets_mm);
 
 }  // namespace abbe::calib

@@ -37,9 +37,9 @@ struct Monomial {
                           const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
 };
 
-/// A(row, coefficient) contains factor * monomial. Row 3 t + c: component c with tool t.
+/// A(component, coefficient) contains factor * monomial.
 struct PolynomialTerm {
-  std::size_t row = 0;
+  std::size_t component = 0;
   std::size_t coefficient = 0;
   Monomial monomial;
   double factor = 1.0;
@@ -48,24 +48,21 @@ struct PolynomialTerm {
 /// Immutable value: A in symbolic form.
 class ErrorPolynomials {
  public:
-  /// BadInput unless kLeastOrder <= order <= kMostOrder and there is at least one tool offset.
+  /// BadInput unless kLeastOrder <= order <= kMostOrder.
   [[nodiscard]] static Result<ErrorPolynomials> of(const KinematicChain&, int order,
-                                                   std::span<const Vector3> tool_offsets_mm);
-  [[nodiscard]] static Result<ErrorPolynomials> of(const KinematicChain&, int order);
+                                                   const Vector3& tool_offset_mm = Vector3::Zero());
 
   /// Names of K: for axis x, y, z, for d (translation) then e (rotation), for direction x, y, z,
   /// order high to low: `k_exz2` = rotation about x, caused by the motion of z, coefficient of z^2.
   /// Then squareness: `S_zx`.
   [[nodiscard]] std::span<const std::string> names() const { return names_; }
   [[nodiscard]] std::span<const PolynomialTerm> terms() const { return terms_; }
-  [[nodiscard]] std::size_t rows() const { return rows_; }  ///< 3 per tool
-  /// rows() x names().size()
-  [[nodiscard]] Eigen::MatrixXd A(const Vector3& p_mm) const;
+  /// 3 x names().size()
+  [[nodiscard]] Eigen::Matrix3Xd A(const Vector3& p_mm) const;
 
  private:
   std::vector<std::string> names_;
   std::vector<PolynomialTerm> terms_;
-  std::size_t rows_ = 0;
 };
 
 }  // namespace abbe::calib

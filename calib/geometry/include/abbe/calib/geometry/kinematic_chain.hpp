@@ -41,12 +41,10 @@ class KinematicChain {
   [[nodiscard]] const std::array<Axis, 3>& order_w_to_t() const { return order_; }
   /// Position in the order from w to t. 0: next to the workpiece, 2: next to the tool.
   [[nodiscard]] std::size_t place(Axis a) const;
-  [[nodiscard]] bool carries_workpiece(Axis a) const { return primed_[index(a)]; }
 
  private:
   std::string text_ = "[w b X Y Z t]";
   std::array<Axis, 3> order_{Axis::X, Axis::Y, Axis::Z};
-  std::array<bool, 3> primed_{};
 };
 
 }  // namespace abbe::calib

@@ -26,7 +26,6 @@ class ModelColumns {
   void push(std::size_t parameter, const Vector3& dV_dU) { memory_[count_++] = {parameter, dV_dU}; }
 
   [[nodiscard]] std::size_t size() const { return count_; }
-  [[nodiscard]] std::size_t capacity() const { return memory_.size(); }
   [[nodiscard]] std::span<const Column> span() const { return memory_.first(count_); }
 
  private:

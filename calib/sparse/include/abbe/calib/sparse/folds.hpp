@@ -29,9 +29,4 @@ struct Folds {
 /// folds on every platform. TooFewObservations with fewer rows than folds or fewer than two folds.
 [[nodiscard]] Result<Folds> random_folds(std::size_t rows, int folds, std::uint64_t seed);
 
-/// Whole groups distributed at random; fold sizes differ by at most one group. folds = number of
-/// groups leaves one group out at a time.
-[[nodiscard]] Result<Folds> group_folds(std::span<const int> group_of_row, int folds,
-                                        std::uint64_t seed);
-
 }  // namespace abbe::calib::sparse

@@ -27,10 +27,6 @@ struct PointsOfInterest {
   /// Derivatives of O_m and of O_bar_m (x1 y1 z1 x2 ...) with respect to a displacement of each
   /// touch along its normal. Displacements along the surface have no effect to first order.
   Eigen::MatrixXd dO_dtouch, dO_bar_dtouch;
-
-  /// Covariance of O_bar_m in m^2, for independent touches with the standard deviation `u_m` along
-  /// the normal.
-  [[nodiscard]] Eigen::MatrixXd covariance_bar_m2(double u_m) const;
 };
 
 /// `axes` as in fit_features(), whose errors it returns. DegenerateGeometry: the axis of a rod is

@@ -21,11 +21,4 @@ struct PathFrame {
 /// `beam_m`: vector from the tracker to the point in machine coordinates, not zero.
 [[nodiscard]] PathFrame path_frame(const Vector3& direction, const Vector3& beam_m, const Noise&);
 
-/// Covariance of one sample in the tracker frame:
-///     sigma_r^2 er er^T + (sigma_a r)^2 (I - er er^T)
-/// er: unit vector of the beam, r: range, sigma_r: sigma_range_m, sigma_a: sigma_angle_rad. This is
-/// [Sanders 2023] eq. (8) to (10) with angles in place of the lengths of eq. (8): propagating
-/// diag(sigma_r^2, (sigma_a / cos el)^2, sigma_a^2) with the Jacobian gives the same result.
-[[nodiscard]] Matrix3 sample_covariance_m2(const Vector3& p_tracker_m, const Noise&);
-
 }  // namespace abbe::calib::otf

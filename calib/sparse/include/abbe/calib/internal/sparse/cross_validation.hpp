@@ -26,24 +26,6 @@ using ParallelFor =
     std::function<void(std::size_t count, const std::function<void(std::size_t)>& task)>;
 void serial_for(std::size_t count, const std::function<void(std::size_t)>& task);
 
-struct CrossValidation {
-  Path path;  ///< regularisation path, fitted to all rows
-  /// Mean squared held-out error for each lambda, unit of y squared; NaN: missing.
-  Eigen::VectorXd error;
-  /// Standard error of `error`, with rows taken as independent (too small when rows share noise).
-  Eigen::VectorXd standard_error;
-  double null_error = 0.0;  ///< mean (y - mean)^2: the error of the empty model
-  Eigen::Index best = 0;    ///< index of lambda
-};
-
-/// Errors of fit_path, also for the training rows of every fold (TooFewObservations names the
-/// fold); BadInput if `folds` does not match the rows; NotConverged if the error is missing for
-/// every lambda.
-[[nodiscard]] Result<CrossValidation> cross_validate(const Eigen::MatrixXd& X,
-                                                     const Eigen::VectorXd& y, const Penalty&,
-                                                     const Folds&, const PathOptions& = {},
-                                                     const ParallelFor& = serial_for);
-
 struct GridCell {
   Eigen::Index lambda = 0, gamma = 0;  ///< indices
 };
@@ -51,21 +33,17 @@ struct GridCell {
 struct GridSearch {
   std::vector<double> gamma;
   std::vector<double> lambda;
-  Eigen::MatrixXd error;  ///< lambda x gamma, as in CrossValidation: the surface to plot
-  Eigen::MatrixXd standard_error;
+  Eigen::MatrixXd error;    ///< lambda x gamma, mean squared held-out error; NaN: missing
   std::vector<Path> paths;  ///< fitted to all rows, one for each gamma
-  double null_error = 0.0;
   GridCell best;
   long sweeps = 0;  ///< of all paths, folds included
-
-  [[nodiscard]] Eigen::VectorXd best_coefficients() const {
-    return paths[static_cast<std::size_t>(best.gamma)].coefficients.col(best.lambda);
-  }
 };
 
-/// Gives the same bits as one call of cross_validate for each gamma. Takes less time: the paths of
-/// one fold for all gamma use the same Gram matrix and are computed in parallel lanes of the vector
-/// registers. One task for all rows and one for each fold.
+/// Gives the same bits as one call for each gamma. Takes less time: the paths of one fold for all
+/// gamma use the same Gram matrix and are computed in parallel lanes of the vector registers. One
+/// task for all rows and one for each fold. Errors of fit_path, also for the training rows of every
+/// fold (TooFewObservations names the fold); BadInput if `folds` does not match the rows or `gamma`
+/// is empty; NotConverged if the error is missing for every pair.
 [[nodiscard]] Result<GridSearch> grid_search(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                              PenaltyKind, const std::vector<double>& gamma,
                                              const Folds&, const PathOptions& = {},

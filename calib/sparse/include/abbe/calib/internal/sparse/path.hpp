@@ -12,7 +12,7 @@
 ///     (Path::reached() < Path::lambda.size()).
 /// The result is a stationary point only to within the tolerance: with badly conditioned columns
 /// the result depends on the order of the columns. MCP and SCAD have many local minima; the warm
-/// start determines which one is found. kkt_violation() (optimality.hpp) checks a result.
+/// start determines which one is found.
 ///
 /// Works on the Gram matrix of the columns. For n rows and p columns: memory p^2, time n p^2 once
 /// and p^2 per sweep; intended for n > p and up to a few thousand columns. Pure, no threads. The
@@ -28,8 +28,10 @@
 namespace abbe::calib::sparse {
 
 struct PathOptions {
-  /// Not increasing, none negative. Empty: default_lambda(); its first value is lambda_max, where
-  /// all coefficients are zero, and costs no sweep.
+  /// Not increasing, none negative. Empty: 100 values equally spaced in the logarithm, from
+  /// lambda_max down to 0.001 lambda_max for n > p (n rows, p columns), else 0.05 lambda_max.
+  /// lambda_max = max_j |x_j' y| / n is the smallest lambda for which all coefficients are zero
+  /// (x_j: standardised columns); it costs no sweep.
   std::vector<double> lambda{};
   double tolerance = 1e-4;  ///< relative to rms(y - mean); 1e-4 as in ncvreg
   long max_sweeps = 10000;  ///< of the whole path; 10000 as in ncvreg
@@ -37,14 +39,6 @@ struct PathOptions {
   /// nullopt: no limit.
   std::optional<Eigen::Index> max_nonzero{};
 };
-
-/// `count` values equally spaced in the logarithm, from lambda_max down to `ratio` times
-/// lambda_max. lambda_max = max_j |x_j' y| / n is the smallest lambda for which all coefficients
-/// are zero; x_j: standardised columns. `ratio` defaults to 0.001 for n > p (n rows, p columns),
-/// else 0.05. Errors as fit_path.
-[[nodiscard]] Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X,
-                                                         const Eigen::VectorXd& y, int count = 100,
-                                                         std::optional<double> ratio = {});
 
 /// A path of solutions. Column k of the matrices belongs to lambda[k]; only the first reached()
 /// values of lambda have a column.
@@ -67,9 +61,5 @@ struct Path {
 /// not vary.
 [[nodiscard]] Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                     const Penalty&, const PathOptions& = {});
-
-/// Predictions for the rows of X, intercept included, from the solution at lambda[k]. X has the
-/// columns of the fit, in the original units.
-[[nodiscard]] Eigen::VectorXd predict(const Path&, const Eigen::MatrixXd& X, Eigen::Index k);
 
 }  // namespace abbe::calib::sparse

@@ -34,12 +34,6 @@ struct Penalty {
 /// BadInput if gamma is too small for the kind, NotFinite if it is NaN or infinite.
 [[nodiscard]] Result<void> check(const Penalty&);
 
-[[nodiscard]] double value(const Penalty&, double lambda, double magnitude);
-[[nodiscard]] double derivative(const Penalty&, double lambda, double magnitude);
-
-/// Value of b that minimises (z - b)^2 / 2 + p(|b|), p: the penalty.
-[[nodiscard]] double minimiser(const Penalty&, double lambda, double z);
-
 /// Largest downward curvature of p: 1/gamma for MCP, 1/(gamma - 1) for SCAD, 0 for the lasso.
 [[nodiscard]] double concavity(const Penalty&);
 

@@ -33,10 +33,9 @@ struct PoseBlockOptions {
   std::function<Vector3(const Vector3& reading_m)> V_at_m{};
 };
 
-/// Blocks in the order of the positions; Block::group is the index of the position. Unknowns: those
-/// of the design, then one error of the array per column of artefact_rows(), each with standard
-/// deviation 1 (the caller adds their prior). Errors: BadInput for an s that is not positive;
-/// those of fit_rigid().
+/// One block per position, in the order of the positions. Unknowns: those of the design, then one
+/// error of the array per column of artefact_rows(), each with standard deviation 1 (the caller adds
+/// their prior). Errors: BadInput for an s that is not positive; those of fit_rigid().
 [[nodiscard]] Result<std::vector<estimation::Block>> pose_blocks(const Observations&,
                                                                  const VolumetricDesign&,
                                                                  const PoseBlockOptions&);

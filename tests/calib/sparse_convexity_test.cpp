@@ -1,9 +1,6 @@
-#include "abbe/calib/internal/sparse/optimality.hpp"
+#include "abbe/calib/internal/sparse/convexity.hpp"
 
 #include <gtest/gtest.h>
-
-#include <Eigen/Eigenvalues>
-#include <cmath>
 
 #include "sparse_problem.hpp"
 
@@ -11,34 +8,6 @@ namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::sparse;
 using namespace abbe::tests::sparse;
-
-TEST(SparseOptimality, ANudgedSolutionViolatesTheConditions) {
-  const Eigen::MatrixXd X = orthogonal_design();
-  const Eigen::VectorXd y = random_problem(16, 1, 31).y;
-  const Penalty lasso{PenaltyKind::Lasso};
-  const auto path = fit_path(X, y, lasso).value();
-  Eigen::VectorXd b = path.standardised.col(50);
-  EXPECT_LE(*kkt_violation(X, y, lasso, path.lambda[50], b), 1e-13);
-  b(2) += 0.01;  // orthogonal columns: the gradient changes by the same amount
-  EXPECT_NEAR(*kkt_violation(X, y, lasso, path.lambda[50], b), 0.01, 1e-12);
-}
-
-TEST(SparseOptimality, SolutionsOfTheLassoAreBelowTheirNeighbours) {
-  const Problem problem = random_problem(40, 8, 32);
-  const Penalty lasso{PenaltyKind::Lasso};
-  const auto path =
-      fit_path(problem.X, problem.y, lasso, {.lambda = {}, .tolerance = 1e-10}).value();
-  const Eigen::VectorXd b = path.standardised.col(40);
-  const double least = *objective(problem.X, problem.y, lasso, path.lambda[40], b);
-
-  for (Eigen::Index j = 0; j < b.size(); ++j) {
-    for (const double step : {-0.01, 0.01}) {
-      Eigen::VectorXd other = b;
-      other(j) += step;
-      EXPECT_LT(least, *objective(problem.X, problem.y, lasso, path.lambda[40], other));
-    }
-  }
-}
 
 TEST(SparseConvexity, OfOrthogonalColumnsIsWhatThePenaltyLeaves) {
   const Eigen::MatrixXd X = orthogonal_design();
@@ -69,10 +38,8 @@ TEST(SparseConvexity, OfTheLassoIsNeverLost) {
   EXPECT_FALSE(convexity(problem.X, path)->first_nonconvex);
 }
 
-TEST(SparseOptimality, RefusesCoefficientsOfAnotherDesign) {
+TEST(SparseConvexity, RefusesThePathOfAnotherDesign) {
   const Problem problem = random_problem(30, 5, 36);
-  EXPECT_EQ(kkt_violation(problem.X, problem.y, {}, 0.1, Eigen::VectorXd::Zero(4)).error().code,
-            ErrorCode::BadInput);
   const auto path = fit_path(problem.X, problem.y, {}).value();
   EXPECT_EQ(convexity(problem.X.leftCols(3), path).error().code, ErrorCode::BadInput);
 }

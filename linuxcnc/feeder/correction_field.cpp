@@ -44,7 +44,7 @@ abbe_wanted refuse_tool(const Vector& tool_m, int number, const Usable& usable) 
 }  // namespace
 
 std::optional<Eigen::Vector3d> command_correction(const daemon::ErrorLattice& field,
-                                                 const Eigen::Vector3d& position_m) {
+                                                  const Eigen::Vector3d& position_m) {
   // Each pass multiplies the remaining error by the slope of V, 1e-3 at most: three give 1e-9 of c.
   constexpr int kPasses = 3;
   if (!position_m.allFinite()) return std::nullopt;

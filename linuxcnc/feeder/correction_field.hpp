@@ -16,7 +16,7 @@ namespace abbe::linuxcnc {
 /// positions. Lengths in m.
 /// nullopt if p + c is not in a cell of the grid of which every corner is inside the volume.
 [[nodiscard]] std::optional<Eigen::Vector3d> command_correction(const daemon::ErrorLattice& field,
-                                                               const Eigen::Vector3d& position_m);
+                                                                const Eigen::Vector3d& position_m);
 
 /// A model for one tool is applied to tools whose offset differs by at most this, as in abbe
 /// (VolumetricModel::holds_for_tool).

@@ -16,10 +16,10 @@ namespace {
 
 using abbe::daemon::ErrorLattice;
 using abbe::daemon::LatticeNode;
-using Eigen::Vector3d;
 using abbe::linuxcnc::command_correction;
 using abbe::linuxcnc::FeedOptions;
 using abbe::linuxcnc::Usable;
+using Eigen::Vector3d;
 
 constexpr double kNode_m = 0.1;
 
@@ -78,7 +78,7 @@ TEST(CommandCorrection, TheToolIsAtTheCommandedPosition) {
 TEST(CommandCorrection, NothingOutsideTheVolume) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Vector3d& p_m : {Vector3d(-0.01, 0.1, 0.1), Vector3d(0.1, 0.1, 0.21),
-                             Vector3d(0.15, 0.15, 0.15), Vector3d(nan, 0.1, 0.1)}) {
+                              Vector3d(0.15, 0.15, 0.15), Vector3d(nan, 0.1, 0.1)}) {
     EXPECT_FALSE(command_correction(grid(), p_m)) << p_m.transpose();
   }
 }

@@ -18,12 +18,12 @@
 #include "abbe/base/known_errors.hpp"
 #include "abbe/base/message.hpp"
 #include "abbe/base/option_values.hpp"
+#include "abbe/dds/field_comparison.hpp"
 #include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/participant_addresses.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
-#include "abbe/messages/error_lattice.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/settings/dds_config.hpp"
 #include "watched_machines.hpp"
@@ -96,7 +96,7 @@ int exit_code_of(const Error& error) {
   }
 }
 
-void print_comparison(const Options& options, const daemon::FieldComparison& c,
+void print_comparison(const Options& options, const dds::FieldComparison& c,
                       const std::string& model_id) {
   if (options.show.json) {
     fmt::print(
@@ -110,7 +110,7 @@ void print_comparison(const Options& options, const daemon::FieldComparison& c,
     return;
   }
 
-  const auto row = [](const char* what, const daemon::FieldComparison::Lengths& s) {
+  const auto row = [](const char* what, const dds::FieldComparison::Lengths& s) {
     fmt::print("  {:<42} mean {:9.3f} um   max {:9.3f} um\n", what, s.mean_m * 1e6, s.max_m * 1e6);
   };
 
@@ -137,7 +137,7 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
   const auto lattice = dds::lattice_of(*nodes);
   ABBE_TRY(lattice);
   const auto comparison =
-      daemon::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
+      dds::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
   ABBE_TRY(comparison);
   print_comparison(options, *comparison, model.state()->model_id());
   return {};

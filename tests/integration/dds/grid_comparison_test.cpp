@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/dds/field_comparison.hpp"
 #include "sample_messages.hpp"
 
 namespace abbe::dds {
@@ -31,15 +33,15 @@ struct Known {
     errors_m.push_back(e);
   }
   [[nodiscard]] auto compared() const {
-    return daemon::compare(positions_m, errors_m, lattice_of(sample_nodes()).value());
+    return compare(positions_m, errors_m, lattice_of(sample_nodes()).value());
   }
 };
 
 /// Four points that span the volume, with the errors of the sample grid plus `rest`.
 Known known_with(const auto& rest) {
   Known known;
-  for (const Vector3d& p : {Vector3d(0.1, 0.2, 0.33), Vector3d(0.7, 0.1, 0.2), Vector3d(0.2, 0.75, 0.1),
-                           Vector3d(0.4, 0.4, 0.8)}) {
+  for (const Vector3d& p : {Vector3d(0.1, 0.2, 0.33), Vector3d(0.7, 0.1, 0.2),
+                            Vector3d(0.2, 0.75, 0.1), Vector3d(0.4, 0.4, 0.8)}) {
     known.add(p, sample_error(p) + rest(p));
   }
   return known;
@@ -49,7 +51,7 @@ TEST(ReceivedLattice, IsExactAtAndBetweenNodesForErrorsLinearInEachCoordinate) {
   const auto grid = lattice_of(sample_nodes());
   ASSERT_TRUE(grid.has_value());
   for (const Vector3d& p : {Vector3d(0, 0, 0), Vector3d(0.8, 0.8, 0.8), Vector3d(0.33, 0.41, 0.77),
-                           Vector3d(0.1, 0.2, 0.3)}) {
+                            Vector3d(0.1, 0.2, 0.3)}) {
     Vector3d error;
     ASSERT_TRUE(grid->at(p, error));
     EXPECT_LT((error - sample_error(p)).norm(), 1e-18)
@@ -90,6 +92,23 @@ TEST(GridComparison, ARigidMotionIsNotObservable) {
   EXPECT_GT(comparison->after.mean_m, 1e-6);
   // Left are the second order of the rotation and rounding.
   EXPECT_LT(comparison->after_rigid_free.max_m, 1e-12);
+}
+
+/// The process that faces the network contains no mathematics of calib: this fit is written twice.
+TEST(GridComparison, RemovesTheMotionThatCalibRemoves) {
+  const auto bend = [](const Vector3d& p) -> Vector3d {
+    return 1e-5 * Vector3d(p.y() * p.z(), 0.3 + p.x() * p.x(), p.x() - p.y());
+  };
+  const auto known = known_with(bend);
+  const auto comparison = known.compared();
+  ASSERT_TRUE(comparison.has_value());
+  std::vector<Vector3d> left_m;
+  for (const Vector3d& p : known.positions_m) left_m.push_back(bend(p));
+  const auto expected = calib::rigid_free(known.positions_m, left_m);
+  ASSERT_TRUE(expected.has_value());
+  EXPECT_GT(expected->rigid_free.max_m, 1e-7);
+  EXPECT_NEAR(comparison->after_rigid_free.max_m, expected->rigid_free.max_m, 1e-15);
+  EXPECT_NEAR(comparison->after_rigid_free.mean_m, expected->rigid_free.mean_m, 1e-15);
 }
 
 TEST(GridComparison, PointsOutsideAreCountedAndLeftOut) {

@@ -19,7 +19,7 @@ std::string symbols_of(const std::string& program) {
   return text;
 }
 
-TEST(DdsPrograms, ContainNoMathematics) {
+TEST(DdsPrograms, ContainNothingOfCalib) {
   for (const char* program : {ABBE_DDS_PROGRAM, ABBE_WATCH_PROGRAM}) {
     const std::string symbols = symbols_of(program);
     EXPECT_NE(symbols.find("abbe::dds::"), std::string::npos) << program << ": nm shows no names";

@@ -1,6 +1,6 @@
 #pragma once
-/// The volumetric error V at the nodes of a lattice, as a DDS subscriber receives it, and the
-/// comparison of such a field with known errors. Lengths in m. Pure.
+/// The volumetric error V at the nodes of a lattice, as a DDS subscriber receives it. Lengths in m.
+/// Pure.
 
 #include <Eigen/Core>
 #include <array>
@@ -31,23 +31,7 @@ class ErrorLattice {
  private:
   std::array<std::vector<double>, 3> coordinates_m_;
   std::vector<Eigen::Vector3d> V_m_;  ///< by x, then y, then z; z varies fastest
-  std::vector<bool> inside_;      ///< same order as V_m_
+  std::vector<bool> inside_;          ///< same order as V_m_
 };
-
-struct FieldComparison {
-  struct Lengths {
-    double mean_m = 0.0, max_m = 0.0;
-  };
-  std::size_t points = 0;      ///< number of compared points
-  std::size_t outside = 0;     ///< points without a value in the field
-  Lengths before;              ///< |V_known|
-  Lengths after;               ///< |V_known - V_field|, gauges unchanged
-  Lengths after_rigid_free;    ///< after removal of the best-fit rigid motion T + r x p
-};
-/// Compares `known_V_m` at `positions_m` with the field. DataInsufficient for fewer than 3 points
-/// inside the field, or all of them on a line.
-[[nodiscard]] Result<FieldComparison> compare(std::span<const Eigen::Vector3d> positions_m,
-                                              std::span<const Eigen::Vector3d> known_V_m,
-                                              const ErrorLattice& field);
 
 }  // namespace abbe::daemon

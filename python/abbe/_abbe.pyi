@@ -110,3 +110,43 @@ def evemu_task(calibrator: str, rotation_reference: str | None = None, u_referen
     """The request for a calibration with the ball array of calibrator.toml, as JSON. For abbe.Control."""
 def mfb_task(bar: str, plan: str) -> str:
     """The request for a calibration with the bar of bar.toml by plan.toml, as JSON. For abbe.Control."""
+
+# The use cases of the command line. Names of files and values are those of its options; without a
+# value: that of the configuration. `compare_with`: the store with whose active model the gate compares.
+# An identified model has its verdict; `save_model` writes it as model.json.
+
+def identify_otf(*, machine: str | None = None, path: str | None = None, tracker: str | None = None,
+                 encoder: str | None = None, recording: str | None = None, targets: Sequence[str] = (),
+                 tracker_centres_mm: Sequence[str] = (),
+                 mode: str | None = None, estimator: str | None = None, tables: str | None = None,
+                 backlash: str | None = None, smoothness: str | None = None,
+                 u_scale_ppm: float | None = None, scales_corrected: bool = False,
+                 accept_path_orientation: bool = False, compare_with: str | None = None) -> Model:
+    """`abbe identify otf`; targets: "X,Y,Z=FILE" in mm, one per run."""
+def identify_evemu(*, machine: str | None = None, touches: str | None = None,
+                   calibrator: str | None = None, errors: str | None = None,
+                   recording: str | None = None, rotation_reference: str | None = None, u_reference_um: float = 1.0,
+                   artefact_C: float | None = None, u_artefact_K: float | None = None,
+                   estimator: str | None = None, folds: str | None = None,
+                   order: int | None = None, scales_corrected: bool = False,
+                   compare_with: str | None = None) -> Model:
+    """`abbe identify evemu`."""
+def identify_mfb(*, machine: str | None = None, bar: str | None = None, plan: str | None = None,
+                 points: str | None = None, recording: str | None = None, estimator: str | None = None,
+                 scales_corrected: bool = False, compare_with: str | None = None) -> Model:
+    """`abbe identify mfb`."""
+def identify_joint(*, machine: str, parts: str, estimator: str | None = None,
+                   compare_with: str | None = None) -> Model:
+    """`abbe identify joint`; abbe.Error "data_insufficient" for parts that contradict each other."""
+def save_model(model: Model, file: str) -> None: ...
+def verify(model: str, *, points: str | None = None, recording: str | None = None,
+           store: str | None = None, tool_mm: str | None = None) -> dict[str, Any]:
+    """`abbe verify`: effect ("better", "not seen", "worse"), places, inside, before and after (mean_m,
+    rms_m, max_m), cautions, points_off, cut_short (why points are missing; empty: none are)."""
+def plan_otf(*, machine: str, trackers_at_mm: Sequence[str] = (), length_m: float | None = None,
+             duration_min: float | None = None, feed_mm_per_min: float = ...) -> dict[str, Any]:
+    """`abbe plan otf`: vertices_m (N, 3), tracker_m, prediction (rms_u_m, max_u_m, length_m, duration_s)."""
+def export_model(model: str, *, to: str, out: str, store: str | None = None, tool_mm: str | None = None,
+                 step_mm: float | None = None, positive: str | None = None, force: bool = False,
+                 why: str = "") -> dict[str, Any]:
+    """`abbe export`, with its report. abbe.Error "refused" for a model that must not be used."""

@@ -49,4 +49,5 @@ PYBIND11_MODULE(_abbe, module) {
   abbe::python::bind_model(module);
   abbe::python::bind_recording(module);
   abbe::python::bind_tasks(module);
+  abbe::python::bind_identify(module);
 }

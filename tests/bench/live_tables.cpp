@@ -111,7 +111,7 @@ int main(int argc, char** argv) {
 
   const auto run = daemon::OtfMethod::run_of(std::move(at_once));
   const auto identify_begin = Clock::now();
-  const auto identified = daemon::identify_run(run, config, nullptr);
+  const auto identified = daemon::OtfMethod::identify(run, config, nullptr, {});
   const double identify_ms = ms_since(identify_begin);
 
   fmt::print("{} points on {} legs, {} in the tables\n", snapshots.size(), vertices - 1,

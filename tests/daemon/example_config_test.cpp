@@ -91,7 +91,8 @@ TEST(ExampleConfig, ItsProbeShowsTheDefaults) {
 
 TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   auto plain = parse_config(example(), "/etc/abbe/abbed.toml").value();
-  use_dds_unit(plain.dds, plain.daemon.runtime_dir, true);  // the defaults of [dds] are those under abbed.service
+  use_dds_unit(plain.dds, plain.daemon.runtime_dir,
+               true);  // the defaults of [dds] are those under abbed.service
   const auto full = parse_config(uncommented(), "/etc/abbe/abbed.toml").value();
 
   EXPECT_EQ(machine_hash(full), machine_hash(plain));

@@ -95,11 +95,26 @@ TEST_F(ExampleFiles, OfTheSimulatorAreAccepted) {
 TEST_F(ExampleFiles, AreListed) {
   const auto ran = abbe("example");
   EXPECT_EQ(ran.exit, 0) << ran.err;
-  for (const char* name :
-       {"abbed.toml", "machine.toml", "first_abbed.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
-        "encoder.csv", "touches.csv", "bar.toml", "plan.toml", "barpoints.csv", "gauge.toml",
-        "parts.toml", "errors.csv", "points.csv", "verification.csv", "certificate.toml",
-        "mtconnect-devices.xml", "truth.csv"})
+  for (const char* name : {"abbed.toml",
+                           "machine.toml",
+                           "first_abbed.toml",
+                           "sim.toml",
+                           "calibrator.toml",
+                           "path.csv",
+                           "tracker.csv",
+                           "encoder.csv",
+                           "touches.csv",
+                           "bar.toml",
+                           "plan.toml",
+                           "barpoints.csv",
+                           "gauge.toml",
+                           "parts.toml",
+                           "errors.csv",
+                           "points.csv",
+                           "verification.csv",
+                           "certificate.toml",
+                           "mtconnect-devices.xml",
+                           "truth.csv"})
     EXPECT_THAT(ran.out, HasSubstr(name));
   std::istringstream lines(ran.out.substr(0, ran.out.find("\n\n")));
   for (std::string line; std::getline(lines, line);)

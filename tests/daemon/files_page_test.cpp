@@ -11,7 +11,6 @@
 
 #include "abbe/base/known_errors.hpp"
 #include "abbe/calib/sparse/folds.hpp"
-#include "abbe/cli/verification_report.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/sim/truth_table.hpp"
 #include "abbe/tables/evemu_files.hpp"
@@ -20,6 +19,7 @@
 #include "abbe/tables/measured_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "abbe/tables/parts_file.hpp"
+#include "abbe/tasks/verification_report.hpp"
 #include "abbe_command.hpp"
 #include "faults_text.hpp"
 #include "recording_fixture.hpp"

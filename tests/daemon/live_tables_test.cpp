@@ -98,7 +98,7 @@ TEST(LiveTables, OfACompleteRunAgreeWithItsModel) {
 
   const Config config = live_config();
   const auto identified =
-      identify_run(OtfMethod::run_of(std::move(run.acquisition)), config, nullptr);
+      OtfMethod::identify(OtfMethod::run_of(std::move(run.acquisition)), config, nullptr, {});
   ASSERT_TRUE(identified) << identified.error().text;
   EXPECT_LT(largest_difference_in_u(*live, identified->solution.model), 2.0);
 }

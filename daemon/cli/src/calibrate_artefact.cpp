@@ -218,7 +218,7 @@ void add_calibrate_artefact(CLI::App& parent, int& exit) {
           "--calibrator", arguments->calibrator,
           "nominal description: calibrator.toml, its blocks with x_mm, y_mm, z_mm, half_size_mm")
       ->required();
-  command->add_option("-o,--output", arguments->out, "file for the measured artefact")
+  command->add_option("-o,--out", arguments->out, "file for the measured artefact")
       ->capture_default_str();
   command->add_option(
       "--touches", arguments->touches,

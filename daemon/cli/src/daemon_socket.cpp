@@ -1,9 +1,5 @@
 #include "daemon_socket.hpp"
 
-#include <fmt/format.h>
-#include <pwd.h>
-#include <unistd.h>
-
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
@@ -24,11 +20,6 @@ Result<std::filesystem::path> socket_path(const DaemonSocket& where) {
   auto config = load_config(where.config);
   ABBE_TRY(config);
   return config->control.socket;
-}
-
-std::string user_name() {
-  const passwd* user = ::getpwuid(::getuid());
-  return user != nullptr ? user->pw_name : fmt::format("uid {}", ::getuid());
 }
 
 }  // namespace abbe::daemon

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
+#include "abbe/tasks/forced_use.hpp"
 
 namespace abbe::daemon {
 
@@ -22,8 +23,5 @@ struct DaemonSocket {
 
 void add_socket_options(CLI::App& command, DaemonSocket& where);
 [[nodiscard]] Result<std::filesystem::path> socket_path(const DaemonSocket& where);
-/// The name of the user who runs this command, recorded by the daemon and the store with what the
-/// command changes.
-[[nodiscard]] std::string user_name();
 
 }  // namespace abbe::daemon

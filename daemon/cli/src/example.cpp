@@ -22,7 +22,8 @@ struct Purpose {
 constexpr std::array kPurposes{
     Purpose{"abbed.toml", "the daemon: machine, devices, checks; every key with its default"},
     Purpose{"machine.toml", "the machine alone, for abbe identify and abbe sim"},
-    Purpose{"first_abbed.toml", "a first abbed.toml: three axes, CANopen encoders, a laser tracker"},
+    Purpose{"first_abbed.toml",
+            "a first abbed.toml: three axes, CANopen encoders, a laser tracker"},
     Purpose{"sim.toml", "abbe sim: simulated machine and devices; every key with its default"},
     Purpose{"calibrator.toml", "a calibrated ball array"},
     Purpose{"path.csv", "the path of a calibration on the fly"},

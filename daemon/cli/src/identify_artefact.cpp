@@ -12,9 +12,9 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/evemu_files.hpp"
+#include "abbe/tasks/vector_option.hpp"
 #include "commands.hpp"
 #include "terminal.hpp"
-#include "vector_option.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -5,7 +5,6 @@
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -18,19 +17,12 @@
 
 #include "abbe/base/input_file.hpp"
 #include "abbe/base/json_text.hpp"
-#include "abbe/base/sha256.hpp"
-#include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/evemu/judge/judge.hpp"
-#include "abbe/config/calib_error.hpp"
-#include "abbe/methods/calibration_run.hpp"
-#include "abbe/methods/evemu/document.hpp"
-#include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
-#include "abbe/result/try.hpp"
+#include "abbe/tasks/identify_evemu.hpp"
 #include "commands.hpp"
-#include "evemu_input.hpp"
 #include "identified_model.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
@@ -41,87 +33,10 @@ namespace {
 
 namespace evemu = calib::evemu;
 
-struct IdentifyEvemuArguments {
-  EvemuInputArguments input;
-  std::string keep, out;
-  std::optional<std::string> estimator, folds;  // without a value: that of [evemu]
-  bool accept_shape_only = false, json = false;
+struct IdentifyEvemuCommand : IdentifyEvemuArguments {
+  std::string out;
+  bool json = false;
 };
-
-struct Outcome {
-  Config config;
-  std::vector<InputFile> sources;
-  EvemuCandidate candidate;
-  std::string recording_gap;
-  ObservedTimes observed;
-  protocol::UtcOffset utc;
-
-  [[nodiscard]] const evemu::Solution& solution() const { return candidate.solution; }
-  [[nodiscard]] const calib::Verdict& verdict() const { return candidate.verdict; }
-};
-
-/// `given` is a keyword, or a file with one fold number for each of the 3 rows of every ball, in
-/// the order of position and ball.
-Result<evemu::SparseOptions> sparse_options(const std::string& given,
-                                            std::vector<InputFile>& sources) {
-  evemu::SparseOptions options;
-  if (const auto by = evemu::folds_by(given)) {
-    options.folds = *by;
-    return options;
-  }
-  const auto text = read_text(given);
-  ABBE_TRY(text);
-  auto folds = calib::sparse::parse_folds(*text);
-  if (!folds) return fail(ErrorCode::BadInput, fmt::format("{}: {}", given, folds.error().text));
-  sources.push_back({std::filesystem::path(given).filename().string(), sha256_hex(*text)});
-  options.given_folds = std::move(*folds);
-  return options;
-}
-
-Result<evemu::JudgeOptions> judge_options(const IdentifyEvemuArguments& arguments,
-                                          EvemuInput& input) {
-  const Config& config = input.config;
-  evemu::JudgeOptions options;
-  options.solve.estimator = *evemu::estimator(arguments.estimator.value_or(config.evemu.estimator));
-  options.limits = gate_limits(config.gate);
-  options.accept_shape_only = arguments.accept_shape_only || config.gate.accepts(evemu::kShapeOnly);
-  auto sparse = sparse_options(arguments.folds.value_or(config.evemu.folds), input.sources);
-  ABBE_TRY(sparse);
-  options.solve.sparse = std::move(*sparse);
-  return options;
-}
-
-Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
-  const auto active = active_model(arguments.keep);
-  ABBE_TRY(active);
-  auto input = read_evemu_input(arguments.input);
-  ABBE_TRY(input);
-  const auto judging = judge_options(arguments, *input);
-  ABBE_TRY(judging);
-  ABBE_TRY(read_rotation_reference(arguments.input, *input));
-
-  auto solution = evemu::solve(input->observations, judging->solve);
-  if (solution && input->reference)
-    solution = evemu::with_rotation_reference(
-        std::move(*solution), {input->reference->points, input->reference->sigma_m});
-  if (!solution) return tl::make_unexpected(error_of(solution.error()));
-
-  const auto other = comparison_model(*active, input->config);
-  auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
-  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  other.add_note(*verdict);
-  input->judge_source(*verdict);
-  if (const auto missing = missing_array_sensor(arguments.input, input->config); !missing.empty())
-    verdict->notes.push_back(fmt::format(
-        "the temperature of the array is not known: {}; give it with --artefact-C", missing));
-
-  return Outcome{std::move(input->config),
-                 std::move(input->sources),
-                 {std::move(input->observations), std::move(*solution), std::move(*verdict)},
-                 std::move(input->recording_gap),
-                 input->observed,
-                 input->utc};
-}
 
 /// The cross-validation error over lambda and gamma, from which they were chosen; cells that no
 /// solution path reached are left out.
@@ -139,9 +54,10 @@ std::string to_surface_csv(const evemu::SparseChoice& choice) {
   return text;
 }
 
-ResultFiles files_of(const ModelDocument& document, const Outcome& outcome) {
+ResultFiles files_of(const EvemuOutcome& outcome) {
+  const ModelDocument& document = outcome.document;
   ResultFiles files{{"coefficients.csv", to_coefficients_csv(*document.model.polynomials())}};
-  if (const auto& choice = outcome.solution().sparse)
+  if (const auto& choice = outcome.candidate.solution.sparse)
     files["cross_validation.csv"] = to_surface_csv(*choice);
   return files;
 }
@@ -157,8 +73,8 @@ nlohmann::json artefact_json(const evemu::ArtefactUncertainty& artefact) {
   if (const auto& e = artefact.expansion)
     object.update({{"temperature_C", e->temperature_K - kZeroCelsius_K},
                    {"u_temperature_K", e->u_temperature_K},
-                   {"growth", calib::expansion_factor(*e)},
-                   {"u_growth", calib::u_expansion_factor(*e)}});
+                   {"expansion_factor", calib::expansion_factor(*e)},
+                   {"u_expansion_factor", calib::u_expansion_factor(*e)}});
   return object;
 }
 
@@ -171,15 +87,15 @@ std::string artefact_text(const evemu::ArtefactUncertainty& artefact) {
            : ", temperature not known: taken as 20 C";
 }
 
-void print_json(const Outcome& outcome, const ModelDocument& document,
-                const std::filesystem::path& folder) {
-  const auto& s = outcome.solution().statistics;
-  const auto& held_out = outcome.verdict().held_out;
+void print_json(const EvemuOutcome& outcome, const std::filesystem::path& folder) {
+  const ModelDocument& document = outcome.document;
+  const auto& s = outcome.candidate.solution.statistics;
+  const auto& held_out = outcome.candidate.verdict.held_out;
   nlohmann::json object{{"model", (folder / "model.json").string()},
                         {"id", model_id(document)},
                         {"hash", model_hash(document)},
                         {"estimator", document.estimator},
-                        {"covariance", evemu::name(outcome.solution().covariance)},
+                        {"covariance", evemu::name(outcome.candidate.solution.covariance)},
                         {"positions", s.positions},
                         {"balls", s.balls},
                         {"observations", s.observations},
@@ -189,28 +105,30 @@ void print_json(const Outcome& outcome, const ModelDocument& document,
                         {"effective_parameters", s.effective_parameters},
                         {"noise_um", s.s_m * kUmPerM},
                         {"pose_rotation_urad", s.w_rad * kUradPerRad},
-                        {"u_mean_rotation_urad", u_rotation_urad(outcome.solution())},
-                        {"shape_only", !outcome.solution().rotation.referenced},
+                        {"u_mean_rotation_urad", u_rotation_urad(outcome.candidate.solution)},
+                        {"shape_only", !outcome.candidate.solution.rotation.referenced},
                         {"residual_rms_before_um", s.before.rms_m * kUmPerM},
                         {"residual_rms_after_um", s.after.rms_m * kUmPerM},
                         {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
                         {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
-                        {"gate", verdict_json(outcome.verdict())}};
+                        {"gate", verdict_json(outcome.candidate.verdict)}};
 
-  if (const auto& artefact = outcome.solution().artefact)
+  if (const auto& artefact = outcome.candidate.solution.artefact)
     object["artefact"] = artefact_json(*artefact);
-  if (const auto& choice = outcome.solution().sparse)
+  if (const auto& choice = outcome.candidate.solution.sparse)
     object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
   fmt::print("{}\n", indented_json_text(object));
 }
 
-void print_summary(const Outcome& outcome, const ModelDocument& document,
-                   const std::filesystem::path& folder) {
-  const auto& s = outcome.solution().statistics;
+void print_summary(const EvemuOutcome& outcome, const std::filesystem::path& folder) {
+  const ModelDocument& document = outcome.document;
+  const auto& s = outcome.candidate.solution.statistics;
   fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n", model_id(document),
              s.unknowns, document.machine);
   fmt::print("artefact    {} positions, {} ball centres{}\n", s.positions, s.balls,
-             outcome.solution().artefact ? artefact_text(*outcome.solution().artefact) : "");
+             outcome.candidate.solution.artefact
+                 ? artefact_text(*outcome.candidate.solution.artefact)
+                 : "");
   fmt::print(
       "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective "
       "parameters\n",
@@ -218,38 +136,35 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
   fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n",
              s.s_m * kUmPerM, s.w_rad * kUradPerRad);
 
-  if (const auto& choice = outcome.solution().sparse)
+  if (const auto& choice = outcome.candidate.solution.sparse)
     fmt::print("chosen      lambda {:.3g}, gamma {:.3g}{}\n", choice->lambda.back(), choice->gamma,
                choice->curvature < 0.0 ? "; not convex there: other solutions may be close" : "");
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
-  fmt::print(
-      "rotation    {}, u = {:.1f} urad about Ball1\n",
-      outcome.solution().rotation.referenced ? "referenced" : "that of the blocks: shape only",
-      u_rotation_urad(outcome.solution()));
-  print_verdict(outcome.verdict());
+  fmt::print("rotation    {}, u = {:.1f} urad about Ball1\n",
+             outcome.candidate.solution.rotation.referenced ? "referenced"
+                                                            : "that of the blocks: shape only",
+             u_rotation_urad(outcome.candidate.solution));
+  print_verdict(outcome.candidate.verdict);
   fmt::print("written     {}, coefficients.csv, report.html\n", (folder / "model.json").string());
 }
 
-int run(const IdentifyEvemuArguments& arguments) {
-  const auto outcome = identify(arguments);
+int run(const IdentifyEvemuCommand& arguments) {
+  ProgressBar bar;
+  const auto outcome = identify_evemu(arguments, bar.progress());
+  bar.clear();
   if (!outcome) return report(outcome.error());
-  const auto now =
-      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  auto document = evemu_document(outcome->candidate, outcome->config, outcome->sources, now);
-  document.recording_gap = outcome->recording_gap;
-  add_measured(document, outcome->observed, outcome->utc);
+  const calib::Verdict& verdict = outcome->candidate.verdict;
   if (const auto done = write_and_keep({arguments.out, arguments.keep, "abbe identify evemu"},
-                                       document, outcome->verdict(), files_of(document, *outcome));
+                                       outcome->document, verdict, files_of(*outcome));
       !done)
     return report(done.error());
-  arguments.json ? print_json(*outcome, document, arguments.out)
-                 : print_summary(*outcome, document, arguments.out);
+  arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
 
-  return exit_code(outcome->verdict());
+  return exit_code(verdict);
 }
 
-void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
+void add_options(CLI::App& command, IdentifyEvemuCommand& arguments) {
   EvemuInputArguments& input = arguments.input;
   auto* machine =
       command.add_option("--machine", input.machine, "machine.toml or the daemon's abbed.toml");
@@ -319,7 +234,7 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
 }  // namespace
 
 void add_identify_evemu(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<IdentifyEvemuArguments>();
+  auto arguments = std::make_shared<IdentifyEvemuCommand>();
   auto* command =
       parent.add_subcommand("evemu",
                             "Identify a model from a ball array touched in several positions.\n"
@@ -330,14 +245,7 @@ void add_identify_evemu(CLI::App& parent, int& exit) {
                             "are written in any case.");
   add_options(*command, *arguments);
 
-  command->callback([arguments, &exit] {
-    const EvemuInputArguments& input = arguments->input;
-    exit = input.touches.empty() && input.errors.empty() && input.recording.empty()
-               ? report({ErrorCode::Usage,
-                         "identify evemu needs --machine with --touches and --calibrator or "
-                         "with --errors, or --recording"})
-               : run(*arguments);
-  });
+  command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 
 }  // namespace abbe::daemon

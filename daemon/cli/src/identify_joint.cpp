@@ -5,57 +5,27 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
-#include <chrono>
 #include <memory>
 #include <utility>
+#include <variant>
 
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
-#include "abbe/methods/otf/inputs.hpp"
-#include "abbe/methods/run_figures.hpp"
-#include "abbe/result/try.hpp"
+#include "abbe/report/sections.hpp"
+#include "abbe/tasks/joint_report.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
-#include "identify_otf.hpp"
-#include "joint_input.hpp"
-#include "joint_report.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
 namespace {
 
-namespace joint = calib::joint;
-
-ModelStatistics joint_statistics(const JointInput& input, const joint::JointModel& model,
-                                 const calib::HeldOutFigures& held_out) {
-  ModelStatistics s;
-  for (const PartFacts& part : input.facts) s.observations += part.observations;
-  s.unknowns = input.common->basis.size() + model.effects.size();
-  s.rank = model.rank;
-  s.condition = model.condition;
-  s.sigma0 = held_out.candidate;
-  s.chi2_per_dof = held_out.candidate * held_out.candidate;
-  s.before.rms_m = held_out.no_compensation_rms_m;
-  s.after.rms_m = held_out.candidate_rms_m;
-  s.iterations = 1;
-  s.stop_reason = "direct";
-  return s;
-}
-
-ModelDocument joint_document(const JointInput& input, const joint::JointModel& model,
-                             const calib::Verdict& verdict) {
-  return {model.model,
-          "joint",
-          "joint",
-          input.config.machine.name,
-          machine_hash(input.config),
-          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()),
-          joint_statistics(input, model, verdict.held_out),
-          input.sources};
-}
+struct IdentifyJointCommand : IdentifyJointArguments {
+  std::string out;
+  bool json = false;
+};
 
 Error contradiction_of(std::vector<std::string> contradictions) {
   return {ErrorCode::DataInsufficient,
@@ -64,45 +34,25 @@ Error contradiction_of(std::vector<std::string> contradictions) {
           std::move(contradictions)};
 }
 
-/// The model of all parts with its verdict; `identified` has no contradiction.
-Result<JointOutcome> judged(const IdentifyJointArguments& arguments, const JointInput& input,
-                            joint::JointIdentification identified, ProgressBar& bar) {
-  const auto active = active_model(arguments.keep);
-  ABBE_TRY(active);
-  const auto other = comparison_model(*active, input.config);
-  calib::otf::Options options = otf_options({}, input.config);
-  if (arguments.estimator)
-    options.estimator = calib::otf::estimator(*arguments.estimator).value_or(options.estimator);
-  options.progress = [&](calib::otf::Stage stage, double fraction) {
-    bar.show(words(stage), fraction);
-  };
-
-  auto verdict = joint::judge(*identified.joint, input.parts, input.runs, *input.common,
-                              other.model, gate_limits(input.config.gate), options);
-  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  for (const PartFacts& part : input.facts)
-    joint::add_verdict_of_part(*verdict, part.name, part.verdict);
-  other.add_note(*verdict);
-  auto contributions = joint::contributions(input.parts, *input.common);
-  if (!contributions) return tl::make_unexpected(error_of(contributions.error()));
-
-  auto document = joint_document(input, *identified.joint, *verdict);
-  document.configuration = input.config.meaning;
-  document.run = run_figures(*verdict, "legs");
-  JointOutcome outcome{input,
-                       std::move(identified.pairs),
-                       std::move(identified.directed),
-                       *std::move(identified.joint),
-                       std::move(*contributions),
-                       std::move(*verdict),
-                       std::move(document)};
-  outcome.document.run->tables = joint_tables(outcome);
-  for (const calib::otf::Observations& run : input.observations)
-    outcome.document.run->places_m.push_back(run.vertices_m);
-  return outcome;
+void print_joint_summary(const JointOutcome& outcome, const std::filesystem::path& folder) {
+  fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
+             outcome.joint.model.tables()->layout().tables().size(), outcome.document.machine);
+  for (std::size_t k = 0; k < outcome.input.facts.size(); ++k) {
+    const PartFacts& part = outcome.input.facts[k];
+    const auto& share = outcome.contributions[k];
+    fmt::print("part        {} ({}): {} observations; u alone {}, of all others {}\n", part.name,
+               part.method, part.observations, u_text(share.u_alone_m), u_text(share.u_without_m));
+  }
+  for (const calib::joint::PairTest& pair : outcome.pairs)
+    fmt::print("agreement   {}: chi-square {:.2f}, {} degrees of freedom, p {:.3g}\n",
+               names_of(outcome.input, pair), pair.all.statistic, pair.all.dof, pair.all.p);
+  fmt::print("uncertainty {} of all parts, rank {}, condition {:.3g}\n",
+             um_text(u_of_joint_m(outcome), 3), outcome.joint.rank, outcome.joint.condition);
+  print_verdict(outcome.verdict);
+  fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
 
-int write_and_print(const IdentifyJointArguments& arguments, const JointOutcome& outcome) {
+int write_and_print(const IdentifyJointCommand& arguments, const JointOutcome& outcome) {
   const ModelDocument& document = outcome.document;
   if (const auto done =
           write_and_keep({arguments.out, arguments.keep, "abbe identify joint"}, document,
@@ -117,29 +67,27 @@ int write_and_print(const IdentifyJointArguments& arguments, const JointOutcome&
   return exit_code(outcome.verdict);
 }
 
-int run_joint(const IdentifyJointArguments& arguments) {
-  ProgressBar bar;
-  const auto input = read_joint_input(arguments, bar);
-  bar.clear();
-  if (!input) return report(input.error());
-  auto identified =
-      joint::identify(input->parts, *input->common, {.false_alarm = arguments.false_alarm});
-  if (!identified) return report(error_of(identified.error()));
-  if (!identified->joint) {
-    if (arguments.json)
-      fmt::print("{}\n", indented_json_text(nlohmann::json{
-                             {"pairs", pairs_json(*input, identified->pairs)},
-                             {"directed", directed_json(*input, identified->directed)},
-                             {"contradictions", identified->contradictions}}));
-    return report(contradiction_of(std::move(identified->contradictions)));
-  }
-
-  const auto outcome = judged(arguments, *input, std::move(*identified), bar);
-  bar.clear();
-  return outcome ? write_and_print(arguments, *outcome) : report(outcome.error());
+int report_contradiction(JointContradiction& found, bool json) {
+  auto& [input, identified] = found;
+  if (json)
+    fmt::print("{}\n", indented_json_text(
+                           nlohmann::json{{"pairs", pairs_json(input, identified.pairs)},
+                                          {"directed", directed_json(input, identified.directed)},
+                                          {"contradictions", identified.contradictions}}));
+  return report(contradiction_of(std::move(identified.contradictions)));
 }
 
-void add_joint_options(CLI::App& command, IdentifyJointArguments& arguments) {
+int run_joint(const IdentifyJointCommand& arguments) {
+  ProgressBar bar;
+  auto found = identify_joint(arguments, bar.progress());
+  bar.clear();
+  if (!found) return report(found.error());
+  if (auto* contradiction = std::get_if<JointContradiction>(&*found))
+    return report_contradiction(*contradiction, arguments.json);
+  return write_and_print(arguments, std::get<JointOutcome>(*found));
+}
+
+void add_joint_options(CLI::App& command, IdentifyJointCommand& arguments) {
   command
       .add_option("--machine", arguments.machine,
                   "machine.toml or the daemon's abbed.toml, for all parts")
@@ -173,7 +121,7 @@ void add_joint_options(CLI::App& command, IdentifyJointArguments& arguments) {
 }  // namespace
 
 void add_identify_joint(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<IdentifyJointArguments>();
+  auto arguments = std::make_shared<IdentifyJointCommand>();
   auto* command = parent.add_subcommand(
       "joint",
       "Identify one model from several runs with a laser tracker (also from several places), ball\n"

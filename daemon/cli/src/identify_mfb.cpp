@@ -5,203 +5,48 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
-#include <chrono>
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "abbe/base/json_text.hpp"
-#include "abbe/base/sha256.hpp"
-#include "abbe/base/units.hpp"
-#include "abbe/calib/mfb/run/touches_off.hpp"
-#include "abbe/methods/calibration_run.hpp"
-#include "abbe/methods/mfb/document.hpp"
-#include "abbe/methods/mfb/identification.hpp"
-#include "abbe/methods/mfb/inputs.hpp"
-#include "abbe/methods/mfb/method.hpp"
 #include "abbe/model/model_document.hpp"
-#include "abbe/recording/recorded_clock.hpp"
-#include "abbe/result/try.hpp"
-#include "abbe/tables/mfb_files.hpp"
+#include "abbe/tasks/identify_mfb.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
-#include "last_complete_run.hpp"
 #include "mfb_summary.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
 
-namespace mfb = calib::mfb;
-
 namespace {
 
-struct IdentifyMfbArguments {
-  std::string machine, bar, plan, points, recording, keep, out;
-  std::string estimator{mfb::name(mfb::Estimator::Joint)};
-  std::size_t trials = 0;  // 0: no Monte Carlo
-  std::uint64_t seed = mfb::MonteCarloOptions{}.seed;
-  bool scales_corrected = false, json = false;
+struct IdentifyMfbCommand : IdentifyMfbArguments {
+  std::string out;
+  bool json = false;
 };
 
-struct MfbInput {
-  Config config;
-  MfbTask task;
-  std::vector<InputFile> sources;
-  std::vector<std::vector<std::size_t>> lines{};  ///< of the touches in their file; else empty
-  std::vector<std::string> against_pass{};
-  ObservedTimes observed{};   ///< of the recording; nullopt for files
-  protocol::UtcOffset utc{};  ///< of the host clock of the recording
-};
-
-/// The machine as it was configured, for the readings of the file `points`.
-Result<Config> read_config(const IdentifyMfbArguments& arguments) {
-  auto config = load_config(arguments.machine);
-  if (!config) return config;
-  ABBE_TRY(check_scales("identify mfb", "points", *config, arguments.scales_corrected));
-  ABBE_TRY(check_bar_machine(arguments.machine, config->machine));
-  return config;
-}
-
-mfb::Options options_of(const IdentifyMfbArguments& arguments) {
-  mfb::Options options;
-  options.solve.estimator =
-      mfb::estimator_named(arguments.estimator).value_or(options.solve.estimator);
-  return options;
-}
-
-/// Bar, plan and touches of a session; nothing is against its pass, because the guide of the
-/// session takes no such touch.
-Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
-  auto recording = open_recording(arguments.recording, arguments.machine);
-  ABBE_TRY(recording);
+int run(const IdentifyMfbCommand& arguments) {
   ProgressBar bar;
-  auto run =
-      last_complete_run<MfbMethod>(*recording, arguments.recording, "calibration with a bar", bar);
-  ABBE_TRY(run);
-
-  MfbInput input{std::move(recording->config),
-                 {.bar = {}, .plan = {}, .passes = {}, .options = options_of(arguments)},
-                 {recording->source}};
-  const auto entered = MfbMethod::inputs_of(*run);
-  input.sources.insert(input.sources.end(), entered.begin(), entered.end());
-  input.task.bar = std::move(run->bar);
-  input.task.plan = std::move(run->plan);
-  input.task.passes = std::move(run->passes);
-  input.observed = run->observed;
-  input.utc = recorded_clock(recording->reader).dates;
-  return input;
-}
-
-Result<MfbInput> input_of_files(const IdentifyMfbArguments& arguments) {
-  auto config = read_config(arguments);
-  ABBE_TRY(config);
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  ABBE_TRY(hash);
-  const auto machine = mfb_machine(config->machine);
-  ABBE_TRY(machine);
-  auto bar = read_bar_toml(arguments.bar);
-  ABBE_TRY(bar);
-  auto plan = read_bar_plan_toml(arguments.plan, bar->bar);
-  ABBE_TRY(plan);
-  auto points = read_bar_points_csv(arguments.points, bar->bar, *plan, machine->nodes);
-  ABBE_TRY(points);
-
-  MfbInput input{std::move(*config),
-                 {.bar = std::move(bar->bar),
-                  .plan = std::move(plan->plan),
-                  .passes = std::move(points->passes),
-                  .options = options_of(arguments)},
-                 {{std::filesystem::path(arguments.machine).filename().string(), *hash},
-                  bar->source,
-                  plan->source,
-                  points->source}};
-  input.lines = std::move(points->lines);
-  input.against_pass = std::move(points->against_pass);
-  return input;
-}
-
-Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
-  auto input =
-      arguments.recording.empty() ? input_of_files(arguments) : input_of_recording(arguments);
-  if (!input) return input;
-  if (arguments.trials > 0)
-    input->task.monte_carlo = {.trials = arguments.trials, .seed = arguments.seed};
-  return input;
-}
-
-/// One line for each touch that alone is not where the other touches of its measurement place it.
-std::vector<std::string> lines_of_touches_off(const std::string& file, const MfbInput& input) {
-  const auto& task = input.task;
-  std::vector<std::string> lines;
-  for (const auto& off : mfb::touches_off(task.bar, task.plan, task.passes)) {
-    const auto& touch = task.passes[off.pass][off.touch];
-    const std::string place =
-        input.lines.empty() ? file : fmt::format("{}:{}", file, input.lines[off.pass][off.touch]);
-    lines.push_back(fmt::format(
-        "{}: {} of \"{}\" alone does not fit: {:.4g} mm off, the other touches fit the plan within "
-        "{:.4g} mm rms: correct or repeat it",
-        place, mfb::name(touch.target), task.plan.measurements[off.pass].name,
-        kMmPerM * off.distance_m, kMmPerM * off.rms_others_m));
-  }
-  return lines;
-}
-
-/// Errors of an identification name measurement and feature. The file of the touches is put before,
-/// what may be the cause behind: touches that alone do not fit, rows against their pass.
-Error in_points(const IdentifyMfbArguments& arguments, const MfbInput& input, Error error) {
-  const std::string& file = arguments.recording.empty() ? arguments.points : arguments.recording;
-  error.text = fmt::format("{}: {}", file, error.text);
-  error.details = lines_of_touches_off(file, input);
-  error.details.insert(error.details.end(), input.against_pass.begin(), input.against_pass.end());
-  return error;
-}
-
-Result<MfbCandidate> identified(const IdentifyMfbArguments& arguments, const MfbInput& input) {
-  const auto active = active_model(arguments.keep);
-  ABBE_TRY(active);
-  const auto other = comparison_model(*active, input.config);
-  ProgressBar bar;
-  auto candidate =
-      identify_with_bar(input.task, input.config, other.model,
-                        [&bar](std::string_view step, double share) { bar.show(step, share); });
+  const auto outcome = identify_mfb(arguments, bar.progress());
   bar.clear();
-  if (!candidate) return tl::make_unexpected(in_points(arguments, input, candidate.error()));
-  if (!input.against_pass.empty())
-    return tl::make_unexpected(in_points(
-        arguments, input, {ErrorCode::BadInput, "the drift of the passes would be wrong"}));
-  other.add_note(candidate->verdict);
-  return candidate;
-}
-
-int run(const IdentifyMfbArguments& arguments) {
-  const auto input = read_input(arguments);
-  if (!input) return report(input.error());
-  const auto candidate = identified(arguments, *input);
-  if (!candidate) return report(candidate.error());
-
-  const auto now =
-      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
-                               input->sources, now);
-  add_measured(document, input->observed, input->utc);
+  if (!outcome) return report(outcome.error());
+  const auto& [candidate, document] = *outcome;
   if (const auto done =
           write_and_keep({arguments.out, arguments.keep, "abbe identify mfb"}, document,
-                         candidate->verdict, {{"tables.csv", to_tables_csv(document.model)}});
+                         candidate.verdict, {{"tables.csv", to_tables_csv(document.model)}});
       !done)
     return report(done.error());
 
   if (arguments.json)
-    fmt::print("{}\n", indented_json_text(mfb_json(document, *candidate, arguments.out)));
+    fmt::print("{}\n", indented_json_text(mfb_json(document, candidate, arguments.out)));
   else
-    print_mfb_summary(document, *candidate, arguments.out);
-  return exit_code(candidate->verdict);
+    print_mfb_summary(document, candidate, arguments.out);
+  return exit_code(candidate.verdict);
 }
 
-void add_options(CLI::App& command, IdentifyMfbArguments& arguments) {
+void add_options(CLI::App& command, IdentifyMfbCommand& arguments) {
   auto* machine =
       command.add_option("--machine", arguments.machine, "machine.toml or the daemon's abbed.toml");
   auto* bar = command.add_option("--bar", arguments.bar, "bar.toml: the calibrated bar");
@@ -246,7 +91,7 @@ void add_options(CLI::App& command, IdentifyMfbArguments& arguments) {
 }  // namespace
 
 void add_identify_mfb(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<IdentifyMfbArguments>();
+  auto arguments = std::make_shared<IdentifyMfbCommand>();
   auto* command = parent.add_subcommand(
       "mfb",
       "Identify all 21 errors of three linear axes from a Multi-Feature Bar probed in several\n"
@@ -254,14 +99,7 @@ void add_identify_mfb(CLI::App& parent, int& exit) {
       "model predicts measurements that were not used in the fit. Exit code 5 if the gate would\n"
       "refuse the model; the files are written in any case.");
   add_options(*command, *arguments);
-  command->callback([arguments, &exit] {
-    exit = arguments->points.empty() && arguments->recording.empty()
-               ? report({ErrorCode::Usage,
-                         "identify mfb: give --points with --machine, --bar and --plan, or "
-                         "--recording",
-                         {}})
-               : run(*arguments);
-  });
+  command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 
 }  // namespace abbe::daemon

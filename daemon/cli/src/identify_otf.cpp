@@ -1,40 +1,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 
 #include "abbe/base/json_text.hpp"
-#include "abbe/base/sha256.hpp"
-#include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/solve/other_beams.hpp"
-#include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_input.hpp"
 #include "abbe/config/capabilities.hpp"
-#include "abbe/config/unmeasured_air.hpp"
-#include "abbe/methods/otf/document.hpp"
-#include "abbe/methods/otf/identification.hpp"
-#include "abbe/methods/otf/inputs.hpp"
-#include "abbe/methods/otf/path_readings.hpp"
-#include "abbe/methods/otf/time_unit.hpp"
 #include "abbe/model/model_document.hpp"
-#include "abbe/result/try.hpp"
-#include "abbe/tables/input_files.hpp"
+#include "abbe/tasks/encoder_clock.hpp"
+#include "abbe/tasks/identify_otf.hpp"
 #include "backlash_lines.hpp"
 #include "commands.hpp"
-#include "encoder_clock.hpp"
 #include "identified_model.hpp"
-#include "identify_otf.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 #include "tracker_drift_lines.hpp"
-#include "vector_option.hpp"
 
 namespace abbe::daemon {
 
@@ -42,193 +25,10 @@ namespace otf = calib::otf;
 
 namespace {
 
-protocol::UtcTime now() {
-  return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-}
-
-}  // namespace
-
-std::string_view words(otf::Stage stage) {
-  switch (stage) {
-    case otf::Stage::Observe:
-      return "averaging blocks";
-    case otf::Stage::Align:
-      return "aligning";
-    case otf::Stage::Solve:
-      return "solving";
-    case otf::Stage::Judge:
-      return "judging";
-  }
-  return "";
-}
-
-void judge_beams(const TrackerFile& points, const otf::Observations& observations,
-                 const otf::Solution& solution, const GateConfig& gate, calib::Verdict& verdict) {
-  if (points.frame == TrackerFile::Frame::Spherical) return;
-  const auto other = otf::find_other_beams(observations, solution);
-  if (!other) return;
-  const calib::Vector3 at_mm = points.centre_m * kMmPerM;
-  constexpr double kDegrees = 180.0 / std::numbers::pi;
-  auto text = fmt::format(
-      "the noise of the points is smallest along ({:.2f}, {:.2f}, {:.2f}) of their frame "
-      "({:.2f} um, across {:.2f} um), {:.0f} degrees from beams from ({:.0f}, {:.0f}, {:.0f}) mm, "
-      "where the tracker is stated to stand",
-      other->direction.x(), other->direction.y(), other->direction.z(), other->along_m * kUmPerM,
-      other->across_m * kUmPerM, other->angle_rad * kDegrees, at_mm.x(), at_mm.y(), at_mm.z());
-  if (gate.accepts(otf::kOtherBeams)) {
-    verdict.notes.push_back(std::move(text));
-    return;
-  }
-  verdict.accepted = false;
-  verdict.refuse(
-      otf::kOtherBeams,
-      text + fmt::format(": state where it stands in this frame; if it does stand there and "
-                         "the machine vibrates so, [gate] accept = [\"{}\"]",
-                         otf::kOtherBeams));
-}
-
-Result<void> apply_frame(const TrackerFile& points, const std::string& file,
-                         otf::Options& options) {
-  if (points.frame != TrackerFile::Frame::Parallel) return {};
-  options.orientation.up.reset();
-  if (options.nests.nests.empty()) return {};
-  return fail(
-      ErrorCode::BadInput,
-      fmt::format("{}: the positions of [[tracker.nest]] are in the frame of the tracker, and "
-                  "the points are not",
-                  file));
-}
-
-OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
-                      std::vector<InputFile> sources) {
-  auto document = otf_document(candidate, config, std::move(sources), now());
-  const auto& s = candidate.solution.statistics;
-  return {std::move(document),
-          std::move(candidate.verdict),
-          s.blocks,
-          s.blocks_used,
-          {candidate.solution.range_offset},
-          candidate.solution.synchronisation,
-          candidate.solution.smoothness};
-}
-
-namespace {
-
-struct Files {
-  Config config;
-  PathFile path;
-  TrackerFile tracker;
-  std::optional<EncoderFile> encoder;
-  std::vector<InputFile> sources;
+struct IdentifyOtfCommand : IdentifyOtfArguments {
+  std::string out;
+  bool json = false;
 };
-
-Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
-  auto config = load_config(arguments.machine);
-  ABBE_TRY(config);
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  ABBE_TRY(hash);
-  auto path = read_path_csv(arguments.path);
-  ABBE_TRY(path);
-  auto tracker = read_tracker_csv(
-      arguments.tracker, [&](double fraction) { bar.show("reading the tracker", fraction); });
-  ABBE_TRY(tracker);
-  ABBE_TRY(place_tracker(*tracker, arguments.tracker_centre_m(0), arguments.tracker,
-                         arguments.centre_option));
-  ABBE_TRY(check_time_unit(arguments.tracker, *tracker, *path));
-  std::vector<InputFile> sources{
-      {std::filesystem::path(arguments.machine).filename().string(), *hash},
-      path->source,
-      tracker->source};
-  std::optional<EncoderFile> encoder;
-
-  if (!arguments.encoder.empty()) {
-    auto read = read_encoder_csv(
-        arguments.encoder, [&](double fraction) { bar.show("reading the scales", fraction); });
-    ABBE_TRY(read);
-    ABBE_TRY(check_time_unit(arguments.encoder, *read, *path));
-    sources.push_back(read->source);
-    encoder = std::move(*read);
-  }
-
-  return Files{std::move(*config), std::move(*path), std::move(*tracker), std::move(encoder),
-               std::move(sources)};
-}
-
-/// Compares the readings of the scales with the path at every vertex where the machine stood still.
-/// Returns the number of these vertices; 0 without an encoder file. An error if readings contradict
-/// the path.
-Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, const Files& files) {
-  if (!files.encoder) return 0;
-  return compare_with_path(arguments.encoder, files.encoder->rows, files.path.vertices_m,
-                           files.config.gate.path_tolerance_m);
-}
-
-}  // namespace
-
-Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
-                                    const std::optional<ActiveDocument>& active, ProgressBar& bar) {
-  auto files = read_files(arguments, bar);
-  ABBE_TRY(files);
-  apply(arguments, files->config);
-  ABBE_TRY(apply_smoothness(arguments.smoothness, files->config));
-  ABBE_TRY(check_scales("identify otf", "a path", files->config, arguments.scales_corrected));
-  ABBE_TRY(check_path(arguments.path, files->path, files->config));
-  const auto compared = vertices_compared(arguments, *files);
-  ABBE_TRY(compared);
-  const auto machine = otf_machine(files->config.machine);
-  ABBE_TRY(machine);
-
-  otf::Options options = otf_options(files->tracker.points, files->config);
-  if (arguments.accept_path_orientation) options.orientation.accepted = true;
-  if (files->encoder) options.orientation.scales_agree = true;
-  ABBE_TRY(apply_frame(files->tracker, arguments.tracker, options));
-  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
-  options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
-
-  otf::Noise noise = otf_noise(files->config.machine);
-  noise.u_scale = u_scale_of(arguments, files->config);
-  const otf::Path path = otf_path(files->path.vertices_m);
-  auto found =
-      files->encoder
-          ? identify_with_scales(files->tracker.points, *machine, path, noise, options,
-                                 encoder_log(files->encoder->rows, arguments.encoder_u_time_us))
-          : otf::identify(files->tracker.points, *machine, path, noise, options);
-  if (!found && options.mode == otf::Mode::Standstill)
-    found.error().text = fmt::format("{}: {}", arguments.tracker, found.error().text);
-  if (!found) return tl::make_unexpected(error_of(found.error()));
-
-  const auto other = comparison_model(active, files->config);
-  std::vector<RunResiduals> residuals{
-      otf::placed_residuals(found->observations, found->solution.residuals)};
-  if (auto& clocks = found->solution.synchronisation; clocks && files->encoder)
-    clocks->clock = clock_of_files(clocks->clock, files->tracker.times, files->encoder->times);
-  auto verdict =
-      otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate),
-                 options, otf::held_out_into(residuals));
-  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  judge_beams(files->tracker, found->observations, found->solution, files->config.gate, *verdict);
-  other.add_note(*verdict);
-  if (files->encoder && *compared == 0)
-    verdict->notes.emplace_back(
-        "the scales were compared with the path to 2 mm only: the machine stops at no vertex");
-  if (auto air = unmeasured_air_text(files->config, noise.u_scale))
-    verdict->notes.push_back(*std::move(air));
-
-  return OtfFromFiles{
-      std::move(files->config), std::move(files->sources), noise, options.mode, *std::move(found),
-      std::move(*verdict),      std::move(residuals)};
-}
-
-namespace {
-
-Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
-                              const std::optional<ActiveDocument>& active, ProgressBar& bar) {
-  auto run = identify_files(arguments, active, bar);
-  ABBE_TRY(run);
-  return outcome_of({std::move(run->found.solution), std::move(run->verdict), run->mode,
-                     std::move(run->residuals)},
-                    run->config, std::move(run->sources));
-}
 
 /// Of one run: two numbers; of several: two arrays, in the order of the runs.
 void add_range_offsets(nlohmann::json& object, const std::vector<otf::RangeOffset>& offsets) {
@@ -242,7 +42,7 @@ void add_range_offsets(nlohmann::json& object, const std::vector<otf::RangeOffse
   object["u_range_offset_um"] = several ? us : us.front();
 }
 
-void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {
+void print_json(const OtfOutcome& outcome, const IdentifyOtfCommand& arguments) {
   const auto& s = outcome.document.statistics;
   const std::filesystem::path folder = arguments.out;
   nlohmann::json object{
@@ -261,7 +61,7 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
       {"rank", s.rank},
       {"condition", s.condition},
       {"sigma0", s.sigma0},
-      {"covariance_factor", s.variance_factor},
+      {"variance_factor", s.variance_factor},
       {"residual_rms_before_um", s.before.rms_m * kUmPerM},
       {"residual_rms_after_um", s.after.rms_m * kUmPerM},
       {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kUmPerM},
@@ -285,7 +85,7 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
   fmt::print("{}\n", indented_json_text(object));
 }
 
-void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {
+void print_summary(const OtfOutcome& outcome, const IdentifyOtfCommand& arguments) {
   const auto& s = outcome.document.statistics;
   const std::filesystem::path folder = arguments.out;
   fmt::print("model       {}  ({} {} tables, tool and machine \"{}\")\n",
@@ -317,35 +117,9 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& argume
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
 
-Result<OtfOutcome> identify(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
-  const auto active = active_model(arguments.keep);
-  ABBE_TRY(active);
-  if (!arguments.targets.empty()) return from_targets(arguments, *active, bar);
-  return arguments.recording.empty() ? from_files(arguments, *active, bar)
-                                     : from_recording(arguments, *active, bar);
-}
-
-/// Reads --tracker-centre-mm.
-Result<void> read_tracker_centres(IdentifyOtfArguments& arguments) {
-  for (const auto& text : arguments.tracker_centres) {
-    const auto centre_m = parse_mm("--tracker-centre-mm", text);
-    ABBE_TRY(centre_m);
-    arguments.tracker_centres_m.push_back(*centre_m);
-  }
-  const std::size_t files = std::max<std::size_t>(1, arguments.targets.size());
-  if (arguments.tracker_centres_m.size() <= 1 || arguments.tracker_centres_m.size() == files)
-    return {};
-  return fail(
-      ErrorCode::Usage,
-      fmt::format("--tracker-centre-mm is given {} times, --target {} times: give the centre once, "
-                  "or once for each --target",
-                  arguments.tracker_centres_m.size(), arguments.targets.size()));
-}
-
-int run(IdentifyOtfArguments& arguments) {
-  if (const auto valid = read_tracker_centres(arguments); !valid) return report(valid.error());
+int run(const IdentifyOtfCommand& arguments) {
   ProgressBar bar;
-  const auto outcome = identify(arguments, bar);
+  const auto outcome = identify_otf_from(arguments, bar.progress());
   bar.clear();
   if (!outcome) return report(outcome.error());
   const ModelDocument& document = outcome->document;
@@ -361,7 +135,7 @@ int run(IdentifyOtfArguments& arguments) {
 }  // namespace
 
 void add_identify_otf(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<IdentifyOtfArguments>();
+  auto arguments = std::make_shared<IdentifyOtfCommand>();
   auto* command = parent.add_subcommand(
       "otf",
       "Identify a model from laser tracker points measured along a path, on the fly or, with\n"
@@ -466,14 +240,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       ->check(CLI::Range(1, 1000));
   add_result_options(*command, arguments->keep, arguments->json, arguments->out);
 
-  command->callback([arguments, &exit] {
-    exit =
-        arguments->tracker.empty() && arguments->recording.empty() && arguments->targets.empty()
-            ? report({ErrorCode::Usage,
-                      "identify otf needs --machine, --path and --tracker (or several --target), "
-                      "or --recording"})
-            : run(*arguments);
-  });
+  command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 
 }  // namespace abbe::daemon

@@ -12,11 +12,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/direct/readings_off.hpp"
-#include "abbe/calib/direct/volume.hpp"
-#include "abbe/config/calib_error.hpp"
 #include "abbe/result/try.hpp"
-#include "abbe/tables/measured_file.hpp"
 #include "figures.hpp"
 #include "terminal.hpp"
 
@@ -25,55 +21,6 @@ namespace {
 
 namespace direct = calib::direct;
 using nlohmann::json;
-
-struct MeasuredComparison {
-  MeasuredFile file;
-  std::vector<direct::TableComparison> tables;
-  calib::Result<direct::VolumeComparison> volume;
-  calib::Vector3 tool_m;
-  std::vector<std::string> rows_off;  ///< values that alone do not fit, one line each
-};
-
-direct::CompareOptions compare_options(const MeasuredOptions& options) {
-  return {.line = options.straightness == "least-squares" ? direct::StraightnessLine::LeastSquares
-                                                          : direct::StraightnessLine::EndPoints,
-          .device = {.u_m = options.u_um / kUmPerM,
-                     .u_rad = options.u_urad / kUradPerRad,
-                     .u_scale = options.u_ppm / kUmPerM}};
-}
-
-/// One line for each value that alone does not fit the others of its error.
-std::vector<std::string> lines_of_rows_off(const std::string& name, const MeasuredFile& file) {
-  std::vector<std::string> lines;
-  for (std::size_t i = 0; i < file.errors.size(); ++i) {
-    const auto& error = file.errors[i];
-    const auto motion = calib::error_motion(error.name);
-    const bool is_angle = !motion || calib::is_rotation(motion->motion);
-    for (const auto& [reading, distance] : direct::readings_off(error))
-      lines.push_back(fmt::format(
-          "{}:{}: {} alone does not fit: {:.4g} {} off the line through its neighbours, compared "
-          "with the other runs: correct or delete it",
-          name, file.lines[i][reading], error.name, kUmPerM * distance, is_angle ? "urad" : "um"));
-  }
-  return lines;
-}
-
-Result<MeasuredComparison> compared(const calib::VolumetricModel& model,
-                                    const MeasuredOptions& options) {
-  auto file = read_measured_csv(options.file);
-  ABBE_TRY(file);
-  const auto wanted = compare_options(options);
-  auto tables = direct::compare(file->errors, model, wanted);
-  if (!tables) {
-    auto error = error_of(tables.error());
-    return tl::make_unexpected(Error{error.code, fmt::format("{}: {}", options.file, error.text),
-                                     lines_of_rows_off(options.file, *file)});
-  }
-  auto volume = direct::compare_in_volume(file->errors, model, wanted.device);
-  auto off = lines_of_rows_off(options.file, *file);
-  return MeasuredComparison{std::move(*file), std::move(*tables), std::move(volume),
-                            model.tool_offsets_m().front(), std::move(off)};
-}
 
 bool any_with(const MeasuredComparison& found, direct::Finding finding) {
   return std::ranges::any_of(found.tables,
@@ -303,7 +250,7 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
 
 Result<int> compare_with_measured(const calib::VolumetricModel& model,
                                   const MeasuredOptions& options, bool json) {
-  const auto found = compared(model, options);
+  const auto found = compare_measured(model, options);
   ABBE_TRY(found);
   json ? print_measured_json(*found, options) : print_measured_text(*found);
 

@@ -5,15 +5,9 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/model/volumetric_model.hpp"
+#include "abbe/tasks/compare_measured.hpp"
 
 namespace abbe::daemon {
-
-struct MeasuredOptions {
-  std::string file;  ///< measured.csv; empty: not wanted
-  std::string straightness = "end-points";
-  double u_um = 0.0, u_urad = 0.0, u_ppm = 0.0;  ///< of the device, k = 1
-};
 
 /// Adds --measured and its options; returns --measured.
 CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options);

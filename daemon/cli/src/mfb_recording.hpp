@@ -6,7 +6,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/methods/mfb/acquisition.hpp"
-#include "opened_recording.hpp"
+#include "abbe/tasks/opened_recording.hpp"
 
 namespace abbe::daemon {
 

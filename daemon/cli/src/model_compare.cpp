@@ -3,17 +3,14 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/model/model_comparison.hpp"
-#include "abbe/result/try.hpp"
+#include "abbe/tasks/compare_models.hpp"
 #include "commands.hpp"
-#include "direction_option.hpp"
 #include "figures.hpp"
 #include "measured_comparison.hpp"
 #include "same_machine.hpp"
@@ -23,66 +20,17 @@
 namespace abbe::daemon {
 namespace {
 
-struct ModelCompareArguments {
-  std::string a, b, direction;
+struct CompareCommand : CompareModelsArguments {
   MeasuredOptions measured;
-  StoreOption store;
-  bool other_machine = false, json = false;
+  bool json = false;
 };
-
-struct Comparison {
-  std::size_t points = 0;
-  calib::ModelDifference difference;
-  std::vector<std::string> cautions_a, cautions_b;
-  std::string machine_a, machine_b;
-  std::string different_machines;  ///< empty: they are the same
-};
-
-/// The points of comparison: those nodes of the two models that are in the validity volume of both.
-std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
-                                          const calib::VolumetricModel& b) {
-  std::vector<calib::Vector3> points;
-  for (const auto* nodes : {&a.nodes(), &b.nodes()}) {
-    for (const calib::Vector3& q : calib::tensor_grid(*nodes)) {
-      if (a.validity().contains(q) && b.validity().contains(q)) points.push_back(q);
-    }
-  }
-  return points;
-}
-
-Result<Comparison> compare(const ModelCompareArguments& arguments) {
-  const auto found_a = found_model(arguments.a, arguments.store);
-  ABBE_TRY(found_a);
-  const auto found_b = found_model(arguments.b, arguments.store);
-  ABBE_TRY(found_b);
-  const std::array machines{of_machine(arguments.a, *found_a), of_machine(arguments.b, *found_b)};
-  auto different = require_same_machine("model compare", machines, arguments.other_machine);
-  ABBE_TRY(different);
-  const ModelDocument *const a = &found_a->document, *const b = &found_b->document;
-
-  const auto travel = parse_direction(arguments.direction);
-  ABBE_TRY(travel);
-  if (!arguments.direction.empty() && b->model.travel() == nullptr) {
-    ABBE_TRY(require_travel(a->model, arguments.a));
-  }
-
-  const auto points = common_points(a->model, b->model);
-  const auto difference = calib::rigid_free_difference(
-      a->model, b->model, a->model.tool_offsets_m().front(), points, *travel);
-  if (!difference)
-    return fail(ErrorCode::DataInsufficient,
-                fmt::format("{} and {}: {}", arguments.a, arguments.b, difference.error().text));
-  return Comparison{points.size(),         *difference,         cautions_of(*found_a),
-                    cautions_of(*found_b), machines[0].machine, machines[1].machine,
-                    *std::move(different)};
-}
 
 void print(const char* what, const calib::VectorStatistics& s) {
   fmt::print("{:<24}  {:>9.3f}  {:>9.3f}  {:>9.3f}\n", what, s.mean_m * kUmPerM, s.rms_m * kUmPerM,
              s.max_m * kUmPerM);
 }
 
-int run_measured(const ModelCompareArguments& arguments) {
+int run_measured(const CompareCommand& arguments) {
   const auto found = found_model(arguments.a, arguments.store);
   if (!found) return report(found.error());
   print_cautions(arguments.a, *found);
@@ -91,8 +39,8 @@ int run_measured(const ModelCompareArguments& arguments) {
   return exit ? *exit : report(exit.error());
 }
 
-int run(const ModelCompareArguments& arguments) {
-  const auto found = compare(arguments);
+int run(const CompareCommand& arguments) {
+  const auto found = compare_models(arguments);
   if (!found) return report(found.error());
   const auto& d = found->difference;
 
@@ -122,7 +70,7 @@ int run(const ModelCompareArguments& arguments) {
 }  // namespace
 
 void add_model_compare(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<ModelCompareArguments>();
+  auto arguments = std::make_shared<CompareCommand>();
   auto* command = parent.add_subcommand(
       "compare",
       "Print the difference of two models at the nodes where both are valid, for the tool of A:\n"

@@ -9,11 +9,11 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "abbe/tasks/direction_option.hpp"
+#include "abbe/tasks/vector_option.hpp"
 #include "commands.hpp"
-#include "direction_option.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
-#include "vector_option.hpp"
 
 namespace abbe::daemon {
 

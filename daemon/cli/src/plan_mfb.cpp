@@ -18,12 +18,17 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/methods/mfb/bar_plan.hpp"
+#include "abbe/tasks/plan_mfb.hpp"
 #include "commands.hpp"
-#include "planned_bar.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
 namespace {
+
+struct PlanMfbCommand : PlanMfbArguments {
+  std::string out;
+  bool json = false;
+};
 
 namespace mfb = calib::mfb;
 
@@ -113,12 +118,12 @@ Error not_seen(const BarPlan& plan, const PlanInputs& inputs) {
   return error;
 }
 
-int run(const PlanMfbArguments& arguments) {
-  const auto inputs = read_inputs(arguments);
+int run(const PlanMfbCommand& arguments) {
+  const auto inputs = bar_plan_inputs(arguments);
   if (!inputs) return report(inputs.error());
   ProgressBar bar(!arguments.json);
-  const auto plan =
-      arguments.check.empty() ? planned(arguments, *inputs, bar) : judged_file(arguments, *inputs);
+  const auto plan = arguments.check.empty() ? plan_mfb(arguments, *inputs, bar.progress())
+                                            : judged_bar_plan(arguments, *inputs);
   bar.clear();
   if (!plan) return report(plan.error());
 
@@ -136,13 +141,7 @@ int run(const PlanMfbArguments& arguments) {
   return 0;
 }
 
-std::vector<std::string> set_names() {
-  std::vector<std::string> names;
-  for (const auto set : mfb::kNamedSets) names.emplace_back(name(set));
-  return names;
-}
-
-std::vector<CLI::Option*> add_set_options(CLI::App& command, PlanMfbArguments& arguments) {
+std::vector<CLI::Option*> add_set_options(CLI::App& command, PlanMfbCommand& arguments) {
   return {
       command
           .add_option("--stylus", arguments.styli,
@@ -156,7 +155,7 @@ std::vector<CLI::Option*> add_set_options(CLI::App& command, PlanMfbArguments& a
                       "paper: 17 measurements in 14 positions; rolled: the same with X3 rolled by\n"
                       "90 degrees, which shows EZX and EB0Z better; minimum: 12 measurements;\n"
                       "indexed: rolled, in 6 clampings on a table with two rotary axes")
-          ->check(CLI::IsMember(set_names())),
+          ->check(CLI::IsMember(bar_plan_sets())),
       command.add_flag("--best", arguments.best,
                        "exchange positions against others while the worst uncertainty falls, with\n"
                        "as many positions and measurements; takes up to a minute"),
@@ -176,7 +175,7 @@ std::vector<CLI::Option*> add_set_options(CLI::App& command, PlanMfbArguments& a
                        "no backward passes: a drift of the machine is not seen")};
 }
 
-std::vector<CLI::Option*> add_noise_options(CLI::App& command, PlanMfbArguments& arguments) {
+std::vector<CLI::Option*> add_noise_options(CLI::App& command, PlanMfbCommand& arguments) {
   return {command.add_option("--tip-radius-mm", arguments.tip_radius_mm, "of the styli")
               ->check(CLI::NonNegativeNumber),
           command.add_option("--probe-um", arguments.probe_um, "standard deviation of a touch")
@@ -198,7 +197,7 @@ std::vector<CLI::Option*> add_noise_options(CLI::App& command, PlanMfbArguments&
 }  // namespace
 
 void add_plan_mfb(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<PlanMfbArguments>();
+  auto arguments = std::make_shared<PlanMfbCommand>();
   auto* command = parent.add_subcommand(
       "mfb",
       "Plan a calibration with a Multi-Feature Bar: where it is clamped and which styli probe it,\n"

@@ -18,172 +18,29 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/otf/plan/plan.hpp"
-#include "abbe/calib/otf/run/polyline.hpp"
-#include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_input.hpp"
-#include "abbe/config/capabilities.hpp"
-#include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/path_plan.hpp"
 #include "abbe/methods/otf/path_program.hpp"
 #include "abbe/result/try.hpp"
-#include "abbe/tables/input_files.hpp"
+#include "abbe/tasks/plan_otf.hpp"
 #include "commands.hpp"
 #include "terminal.hpp"
-#include "vector_option.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace otf = calib::otf;
 
-constexpr double kMinute_s = 60.0;
-
-struct PlanOtfArguments {
-  std::string machine, path, out;
-  std::string chain = "[w b X Y Z t]", tool = "0,0,0";
-  std::vector<double> travel_mm;
-  double node_spacing_mm = 50.0;
-  std::vector<std::string> trackers, dialects;
-  double feed_mm_per_min = 2500.0;
-  std::optional<double> length_m, budget_min, points_per_s;
-  otf::Drive drive;
-  std::size_t lattice = otf::PlanOptions{}.lattice, exchanges = otf::PlanOptions{}.exchanges;
+struct PlanOtfCommand : PlanOtfArguments {
+  std::string out;
+  std::vector<std::string> dialects;
   bool json = false;
 };
-
-/// A path with its prediction, and the tracker positions that were compared.
-struct PathPlan {
-  otf::PlannedRun run;
-  otf::Path path;
-  otf::Prediction prediction;
-  tl::expected<otf::Prediction, calib::Error> base;
-  std::vector<std::pair<calib::Vector3, double>> trackers;  ///< position, rms_u_m
-  std::size_t corners_not_reached = 0;
-};
-
-/// The configuration file that the options stand for, without tracker and devices.
-Result<Config> machine_of_options(const PlanOtfArguments& arguments) {
-  const auto tool_m = parse_mm("--tool", arguments.tool);
-  ABBE_TRY(tool_m);
-  std::string text =
-      fmt::format("[machine]\nname = \"command line\"\nchain = \"{}\"\n", arguments.chain);
-  for (std::size_t k = 0; k < 3; ++k) {
-    text += fmt::format("[axes.{}]\nmin_mm = {:.17g}\nmax_mm = {:.17g}\n", "XYZ"[k],
-                        arguments.travel_mm[2 * k], arguments.travel_mm[2 * k + 1]);
-  }
-  text += fmt::format("[target]\noffset_mm = [{:.17g}, {:.17g}, {:.17g}]\n", (*tool_m)[0] * kMmPerM,
-                      (*tool_m)[1] * kMmPerM, (*tool_m)[2] * kMmPerM);
-  text += fmt::format("[model]\nnode_spacing_mm = {:.17g}\n", arguments.node_spacing_mm);
-  return parse_config(text, "options");
-}
-
-Result<std::vector<calib::Vector3>> trackers_of(const PlanOtfArguments& arguments,
-                                                const MachineConfig& machine) {
-  std::vector<calib::Vector3> trackers;
-  for (const auto& text : arguments.trackers) {
-    const auto at = parse_mm("--tracker-at", text);
-    ABBE_TRY(at);
-    trackers.push_back(*at);
-  }
-  if (trackers.empty() && machine.tracker_position_m)
-    trackers.emplace_back(machine.tracker_position_m->data());
-  if (trackers.empty())
-    return fail(ErrorCode::Usage,
-                "plan otf: the position of the tracker is unknown: --tracker-at x,y,z in machine "
-                "coordinates, or [tracker] position_mm in the configuration");
-  return trackers;
-}
-
-Result<otf::PlannedRun> run_of(const PlanOtfArguments& arguments, const Config& config) {
-  ABBE_TRY(require_target(config.machine));
-  const auto machine = otf_machine(config.machine);
-  ABBE_TRY(machine);
-  otf::PlannedRun run{.machine = *machine, .noise = otf_noise(config.machine)};
-  run.backlash = calib_of(config.otf.backlash);
-  run.drive = arguments.drive;
-  run.drive.feed_m_per_s = arguments.feed_mm_per_min / kMmPerM / kMinute_s;
-  if (const auto tracker = tracker_source(config); tracker)
-    run.points_per_s = tracker->point_rate_hz;
-  if (arguments.points_per_s) run.points_per_s = *arguments.points_per_s;
-  return run;
-}
-
-otf::PathBudget budget_of(const PlanOtfArguments& arguments, const otf::Machine& machine) {
-  otf::PathBudget budget;
-  if (arguments.length_m) budget.length_m = *arguments.length_m;
-  if (arguments.budget_min) budget.duration_s = *arguments.budget_min * kMinute_s;
-  if (!arguments.length_m && !arguments.budget_min)
-    budget.length_m = otf::lengths_to_vertices_m(otf::base_path(machine.nodes)).back();
-  return budget;
-}
-
-/// Compares the tracker positions by quick walks, and sets the best one in `run`.
-Result<std::vector<std::pair<calib::Vector3, double>>> compare_trackers(
-    otf::PlannedRun& run, const std::vector<calib::Vector3>& trackers,
-    const otf::PathBudget& budget) {
-  std::vector<std::pair<calib::Vector3, double>> compared;
-  for (const auto& tracker_m : trackers) {
-    run.tracker_m = tracker_m;
-    const auto quick = otf::plan(run, budget, {.lattice = 3, .exchanges = 0});
-    if (!quick) return tl::make_unexpected(error_of(quick.error()));
-    compared.emplace_back(tracker_m, quick->rms_u_m);
-  }
-  run.tracker_m = std::min_element(compared.begin(), compared.end(), [](auto& a, auto& b) {
-                    return a.second < b.second;
-                  })->first;
-  return compared;
-}
-
-Result<otf::Path> path_of_file(const std::string& file) {
-  const auto path = read_path_csv(file);
-  ABBE_TRY(path);
-  return otf_path(path->vertices_m);
-}
-
-Result<PathPlan> planned(const PlanOtfArguments& arguments, ProgressBar& bar) {
-  const auto config =
-      arguments.machine.empty() ? machine_of_options(arguments) : load_config(arguments.machine);
-  ABBE_TRY(config);
-  const auto trackers = trackers_of(arguments, config->machine);
-  ABBE_TRY(trackers);
-  auto run = run_of(arguments, *config);
-  ABBE_TRY(run);
-
-  const otf::PathBudget budget = budget_of(arguments, run->machine);
-  PathPlan plan{.run = *run};
-  plan.run.tracker_m = trackers->front();
-  if (!arguments.path.empty()) {
-    auto path = path_of_file(arguments.path);
-    ABBE_TRY(path);
-    plan.path = *std::move(path);
-  } else {
-    if (trackers->size() > 1) {
-      auto compared = compare_trackers(plan.run, *trackers, budget);
-      ABBE_TRY(compared);
-      plan.trackers = *std::move(compared);
-    }
-    const auto best = otf::plan(plan.run, budget,
-                                {.lattice = arguments.lattice,
-                                 .exchanges = arguments.exchanges,
-                                 .progress = [&](double share) { bar.show("planning", share); }});
-    if (!best) return tl::make_unexpected(error_of(best.error()));
-    plan.path = best->path;
-    plan.corners_not_reached = best->corners_not_reached;
-  }
-
-  const auto prediction = otf::predict(plan.path, plan.run);
-  if (!prediction) return tl::make_unexpected(error_of(prediction.error()));
-  plan.prediction = *prediction;
-  plan.base = otf::predict(otf::base_path(plan.run.machine.nodes), plan.run);
-  return plan;
-}
 
 std::vector<double> in_mm(const calib::Vector3& p_m) {
   return {p_m[0] * kMmPerM, p_m[1] * kMmPerM, p_m[2] * kMmPerM};
 }
 
-nlohmann::json plan_json(const PathPlan& plan, const PlanOtfArguments& arguments) {
+nlohmann::json plan_json(const PathPlan& plan, const PlanOtfCommand& arguments) {
   nlohmann::json trackers = nlohmann::json::array();
   for (const auto& [tracker_m, rms_u_m] : plan.trackers)
     trackers.push_back({{"position_mm", in_mm(tracker_m)}, {"rms_u_um", rms_u_m * kUmPerM}});
@@ -203,8 +60,7 @@ double stand_s(const otf::PlannedRun& run) {
   return std::max(kLeast_s, kPoints / run.points_per_s);
 }
 
-Result<std::vector<std::string>> write_plan(const PathPlan& plan,
-                                            const PlanOtfArguments& arguments) {
+Result<std::vector<std::string>> write_plan(const PathPlan& plan, const PlanOtfCommand& arguments) {
   const std::filesystem::path folder = arguments.out;
   ABBE_TRY(create_folder(folder, NewFolder::OfTheCaller));
   std::vector<std::pair<std::string, std::string>> files{
@@ -271,9 +127,9 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
   if (!written.empty()) fmt::print("written     {} in {}\n", fmt::join(written, ", "), folder);
 }
 
-int run(const PlanOtfArguments& arguments) {
+int run(const PlanOtfCommand& arguments) {
   ProgressBar bar(!arguments.json);
-  const auto plan = planned(arguments, bar);
+  const auto plan = plan_otf(arguments, bar.progress());
   bar.clear();
   if (!plan) return report(plan.error());
   std::vector<std::string> written;
@@ -289,7 +145,7 @@ int run(const PlanOtfArguments& arguments) {
   return 0;
 }
 
-void add_machine_options(CLI::App& command, PlanOtfArguments& arguments) {
+void add_machine_options(CLI::App& command, PlanOtfCommand& arguments) {
   auto* machine = command.add_option("--machine,-c", arguments.machine,
                                      "machine.toml or the daemon's abbed.toml");
   auto* travel = command
@@ -313,7 +169,7 @@ void add_machine_options(CLI::App& command, PlanOtfArguments& arguments) {
   for (auto* option : {chain, tool, nodes}) option->needs(travel);
 }
 
-void add_drive_options(CLI::App& command, PlanOtfArguments& arguments) {
+void add_drive_options(CLI::App& command, PlanOtfCommand& arguments) {
   command
       .add_option("--feed,--feed-mm-per-min", arguments.feed_mm_per_min, "feed on each leg, mm/min")
       ->check(CLI::PositiveNumber)
@@ -335,7 +191,7 @@ void add_drive_options(CLI::App& command, PlanOtfArguments& arguments) {
 }  // namespace
 
 void add_plan_otf(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<PlanOtfArguments>();
+  auto arguments = std::make_shared<PlanOtfCommand>();
   auto* command = parent.add_subcommand(
       "otf",
       "Plan the path of an on-the-fly calibration: the path with the smallest predicted "
@@ -383,11 +239,7 @@ void add_plan_otf(CLI::App& parent, int& exit) {
   command->add_flag("--json", arguments->json, "print the figures as one JSON object");
   command->add_option("-o,--out", arguments->out, "folder for the results; created if needed");
 
-  command->callback([arguments, &exit] {
-    exit = arguments->machine.empty() && arguments->travel_mm.empty()
-               ? report({ErrorCode::Usage, "plan otf needs --machine or --travel-mm"})
-               : run(*arguments);
-  });
+  command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 
 }  // namespace abbe::daemon

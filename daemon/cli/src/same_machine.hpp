@@ -1,31 +1,12 @@
 #pragma once
-/// The difference of models of two machines says nothing about either of them. Commands that
-/// compare models refuse such a pair, unless --other-machine states that it is meant.
+/// The option --other-machine.
 
 #include <CLI/App.hpp>
-#include <span>
-#include <string>
 
-#include "store_option.hpp"
+#include "abbe/tasks/same_machine.hpp"
 
 namespace abbe::daemon {
 
-/// What is compared, and its machine.
-struct OfMachine {
-  std::string what;  ///< for people: "a.json", "run.mcap"
-  std::string machine;
-};
-/// The machine of a model: the name in its configuration; of a model from the data folder of
-/// another machine, with a remark.
-[[nodiscard]] OfMachine of_machine(const std::string& name, const FoundModel& model);
-
 void add_other_machine_option(CLI::App& command, bool& other_machine);
-
-/// A sentence that names the machines; empty if all are the same one.
-[[nodiscard]] std::string different_machines(std::span<const OfMachine> compared);
-/// Usage if the machines differ and `other_machine` is false; else different_machines().
-[[nodiscard]] Result<std::string> require_same_machine(const std::string& command,
-                                                       std::span<const OfMachine> compared,
-                                                       bool other_machine);
 
 }  // namespace abbe::daemon

@@ -1,7 +1,5 @@
 #include "scales_corrected.hpp"
 
-#include <fmt/format.h>
-
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
@@ -12,18 +10,6 @@ CLI::Option* add_scales_corrected(CLI::App& command, bool& corrected) {
       "--scales-corrected,--path-corrected", corrected,
       "the readings of the files are corrected for the temperature of the scales\n"
       "([[thermal]])");
-}
-
-Result<void> check_scales(std::string_view command, std::string_view what, const Config& config,
-                          bool corrected) {
-  if (config.thermal.empty() || corrected) return {};
-  return fail(
-      ErrorCode::BadInput,
-      fmt::format(
-          "{}: [[thermal]] is configured, and the files hold no temperatures: use --recording, "
-          "or give {} corrected for the temperature of the scales and add "
-          "--scales-corrected",
-          command, what));
 }
 
 }  // namespace abbe::daemon

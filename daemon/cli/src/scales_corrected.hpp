@@ -1,23 +1,13 @@
 #pragma once
-/// Check of an identification from files whose configuration has [[thermal]] (correction of the
-/// readings for the temperature of the scales). The daemon applies a model to corrected readings. A
-/// model identified from uncorrected readings contains the thermal expansion of the scales, which
-/// would then be corrected twice.
+/// The option --scales-corrected.
 
 #include <CLI/App.hpp>
-#include <string_view>
 
-#include "abbe/base/error.hpp"
-#include "abbe/config/config.hpp"
+#include "abbe/tasks/scales_corrected.hpp"
 
 namespace abbe::daemon {
 
 /// Adds the option --scales-corrected, which sets `corrected`.
 CLI::Option* add_scales_corrected(CLI::App& command, bool& corrected);
-
-/// BadInput if the configuration has [[thermal]] and the user has not stated (`corrected`) that the
-/// readings of `what` ("the path") are corrected.
-[[nodiscard]] Result<void> check_scales(std::string_view command, std::string_view what,
-                                        const Config& config, bool corrected);
 
 }  // namespace abbe::daemon

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "abbe/base/error.hpp"
+#include "abbe/tasks/progress.hpp"
 
 namespace abbe::daemon {
 
@@ -31,6 +32,10 @@ class ProgressBar {
   ~ProgressBar() { clear(); }
 
   void show(std::string_view step, double fraction);
+  /// Shows what a task reports; the bar must outlive it.
+  [[nodiscard]] Progress progress() {
+    return Progress([this](std::string_view step, double share) { show(step, share); });
+  }
   void clear();
 
  private:

@@ -9,20 +9,14 @@
 
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/config/json_vector.hpp"
-#include "abbe/pipeline/standstill_points.hpp"
-#include "abbe/replay/replay.hpp"
 #include "abbe/result/try.hpp"
 #include "interruption.hpp"
-#include "opened_recording.hpp"
-#include "terminal.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 using namespace std::chrono_literals;
 using nlohmann::json;
-
-using Keep = std::function<Result<void>(const VerificationFile&)>;
 
 constexpr auto kPointPollPeriod = 200ms;
 
@@ -36,7 +30,7 @@ void print_point(std::size_t number, const json& point) {
 /// Requests the points that are new since the last call from the daemon, prints them and keeps them
 /// in `out`. Returns why the daemon collects no more points; empty if it still collects.
 Result<std::string> poll_points(const std::filesystem::path& socket, const json& number,
-                                const char* step, VerificationFile& out, const Keep& keep) {
+                                const char* step, VerificationFile& out, const KeepPoints& keep) {
   const auto answer = ask_daemon(
       socket,
       {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
@@ -61,33 +55,8 @@ Result<LivePoints> points_so_far(VerificationFile& points, const std::string& ma
 
 }  // namespace
 
-Result<LivePoints> points_of_recording(const std::string& file) {
-  const auto recording = open_recording(file);
-  ABBE_TRY(recording);
-  const Config& config = recording->config;
-  if (const auto possible = check_verification(config); !possible)
-    return fail(ErrorCode::DataInsufficient, fmt::format("{}: {}", file, possible.error().text));
-
-  StandstillPoints standstills{standstill_options(config)};
-  ProgressBar bar;
-  const auto replayed =
-      replay(recording->reader, config,
-             {.progress = [&bar](double share) { bar.show("replaying", share); },
-              .snapshots = [&standstills](const protocol::Snapshot& s) { standstills.take(s); }});
-  ABBE_TRY(replayed);
-  standstills.finish();
-
-  LivePoints out{{recording->source, {}, {}}, {}, config.machine.name};
-  for (const auto& p : standstills.points()) out.file.points.push_back(p.mean);
-  if (const auto damage = recording->reader.damage(); !damage.empty())
-    out.cut_short = Error{ErrorCode::DataInsufficient, fmt::format("{}: {}", file, damage), {}};
-
-  return out;
-}
-
 Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::size_t count,
-                                    const Keep& keep,
-                                    const std::function<Result<void>(const std::string&)>& accept) {
+                                    const KeepPoints& keep, const AcceptMachine& accept) {
   const auto begun = ask_daemon(socket, {{"do", "verification"}, {"step", "begin"}});
   ABBE_TRY(begun);
   const json number = begun->at("number");

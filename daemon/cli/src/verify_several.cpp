@@ -10,13 +10,13 @@
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/verify/compare.hpp"
-#include "abbe/cli/verification_report.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/result/try.hpp"
-#include "effect_name.hpp"
+#include "abbe/tasks/effect_name.hpp"
+#include "abbe/tasks/vector_option.hpp"
+#include "abbe/tasks/verification_report.hpp"
 #include "figures.hpp"
 #include "same_machine.hpp"
-#include "vector_option.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -27,7 +27,7 @@ struct SeveralOptions {
 };
 
 /// Reads the models; `tool`: x,y,z in mm, or empty for the tool of each model. Errors of
-/// model_named() and tool_of(). Usage: different tool offsets without `tool`: the points were
+/// found_model() and tool_of(). Usage: different tool offsets without `tool`: the points were
 /// measured with one.
 [[nodiscard]] Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& names,
                                                            const StoreOption& store,

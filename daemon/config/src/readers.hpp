@@ -4,9 +4,9 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/mtconnect_config.hpp"
-#include "abbe/settings/section.hpp"
 #include "abbe/config/web_config.hpp"
 #include "abbe/settings/bounded_toml.hpp"
+#include "abbe/settings/section.hpp"
 #include "classified_section.hpp"
 
 namespace abbe::daemon {

@@ -25,11 +25,6 @@ std::string_view method_of(const Candidate& candidate) noexcept {
   return Methods::visit(candidate, [](auto method, const auto&) { return method.kName; });
 }
 
-const calib::VolumetricModel& model_of(const Candidate& candidate) {
-  return std::visit([](const auto& c) -> const calib::VolumetricModel& { return c.model(); },
-                    candidate);
-}
-
 const calib::Verdict& verdict_of(const Candidate& candidate) {
   return std::visit([](const auto& c) -> const calib::Verdict& { return c.verdict; }, candidate);
 }

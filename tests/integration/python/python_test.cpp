@@ -174,6 +174,14 @@ fault(lambda: model.error_at([1.0, 2.0]))
 fault(lambda: model.error_at([[1.0, 2.0]]))
 fault(lambda: abbe.Control("/no/such/socket").status())
 fault(lambda: abbe.Subscription(program="no-such-program"))
+fault(lambda: abbe.identify_otf())
+fault(lambda: abbe.identify_otf(recording="a.mcap", path="path.csv"))
+fault(lambda: abbe.identify_otf(machine="m.toml", path="p.csv", tracker="t.csv",
+                                mode="stand-still"))
+fault(lambda: abbe.identify_evemu(machine="m.toml", touches="t.csv", calibrator="c.toml",
+                                  artefact_C=21))
+fault(lambda: abbe.identify_mfb(machine="m.toml", points="p.csv", bar="b.toml"))
+fault(lambda: abbe.verify(sys.argv[1]))
 )";
   const auto seen = python({"-c", kFaults, ABBE_MODEL});
   EXPECT_EQ(seen.code, 0) << seen.err;
@@ -181,8 +189,14 @@ fault(lambda: abbe.Subscription(program="no-such-program"))
       seen.out,
       AllOf(HasSubstr("io: read missing.json"), HasSubstr("model.json: is not an MCAP file"),
             HasSubstr("usage: points_m: must be an array of N x 3 numbers"),
-            HasSubstr("io: connect /no/such/socket"), HasSubstr("io: start no-such-program")));
-  EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 6);
+            HasSubstr("io: connect /no/such/socket"), HasSubstr("io: start no-such-program"),
+            HasSubstr("usage: identify otf needs --machine, --path and --tracker"),
+            HasSubstr("usage: --path has no effect beside --recording"),
+            HasSubstr("usage: --mode: \"stand-still\": must be on-the-fly, standstill"),
+            HasSubstr("usage: --artefact-C and --u-artefact-K: give both"),
+            HasSubstr("usage: identify mfb needs --plan"),
+            HasSubstr("usage: verify: give --points, --recording or --live")));
+  EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 12);
 }
 
 /// Counts and times of all samples, exact.
@@ -221,6 +235,34 @@ TEST_F(Python, TheExamplesOfARecordingAndAModelRun) {
   EXPECT_THAT(model.out, AllOf(HasSubstr("EXX: 3 nodes"), HasSubstr("2000 of 2000 places inside")));
 }
 
+/// The use cases of the command line: recording, abbed.toml, store, file for an export and a model.
+constexpr const char* kUseCases = R"(
+import abbe, numpy, sys
+recording, machine, store, grid, copy = sys.argv[1:]
+model = abbe.identify_otf(recording=recording)
+print("identified", model.id)
+print("verdict", model.verdict["state"])
+abbe.save_model(model, copy)
+print("saved", abbe.Model.load(copy).hash == model.hash)
+
+hull_m = model.validity_hull_m
+places_m = numpy.random.default_rng(1).uniform(hull_m.min(0), hull_m.max(0), (20, 3))
+V_m = model.error_at(places_m)[0]
+rows_mm = 1e3 * numpy.hstack([places_m, places_m + V_m])
+numpy.savetxt(grid + ".points", rows_mm, fmt="%.9f", delimiter=",", comments="",
+              header="x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm")
+print("effect", abbe.verify(copy, points=grid + ".points")["effect"])
+
+plan = abbe.plan_otf(machine=machine, trackers_at_mm=["-750,-620,-350"], length_m=6)
+print("planned", len(plan["vertices_m"]), "vertices", plan["prediction"]["rms_u_m"] > 0)
+done = abbe.export_model("active", to="csv-grid", out=grid, store=store)
+print("exported", len(done["files"]), "file of", done["model_hash"])
+try:
+    abbe.identify_otf(machine=machine, path=copy, tracker=copy)
+except abbe.Error as error:
+    print("missing", error.code)
+)";
+
 TEST_F(Python, CalibratesByAnExampleAndFollowsTheVectorsOverDds) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_simulator());
@@ -254,6 +296,23 @@ except abbe.Error as error:
   EXPECT_EQ(followed.code, 0) << followed.err;
   EXPECT_THAT(followed.out, AllOf(HasSubstr("model ACTIVE"), HasSubstr("session active"),
                                   ContainsRegex("vectors: [1-9][0-9]* may be applied")));
+
+  const std::string active = status()["model"]["hash"].get<std::string>();
+  abbed_->signal(SIGTERM);
+  EXPECT_EQ(abbed_->wait_for_end(kPatienceForARun), 0) << abbed_->err();
+  ASSERT_FALSE(recordings().empty());
+  const std::string recording = recordings().back().string();
+  const auto identified = run(
+      {ABBE_PROGRAM, "identify", "otf", "--recording", recording, "--out", file("out"), "--json"});
+  ASSERT_EQ(identified.code, 0) << identified.err;
+  const auto used = python({"-c", kUseCases, recording, file("abbed.toml"), file("data/models"),
+                            file("grid.csv"), file("copy.json")});
+  EXPECT_EQ(used.code, 0) << used.err;
+  EXPECT_THAT(used.out,
+              AllOf(HasSubstr("identified " + json::parse(identified.out)["id"].get<std::string>()),
+                    HasSubstr("verdict accepted"), HasSubstr("saved True"),
+                    HasSubstr("effect better"), ContainsRegex("planned [1-9][0-9]* vertices"),
+                    HasSubstr("exported 1 file of " + active), HasSubstr("missing bad_input")));
 }
 
 TEST_F(Python, VerifiesAtAStandstillAndOrdersTheTracker) {

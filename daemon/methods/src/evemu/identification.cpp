@@ -13,11 +13,10 @@
 #include "usable_touch.hpp"
 
 namespace abbe::daemon {
-namespace {
 
 namespace evemu = calib::evemu;
 
-evemu::JudgeOptions judge_options(const Config& config) {
+evemu::JudgeOptions evemu_judge_options(const Config& config) {
   evemu::JudgeOptions options;
   options.limits = gate_limits(config.gate);
   options.accept_shape_only = config.gate.accepts(evemu::kShapeOnly);
@@ -29,8 +28,6 @@ evemu::JudgeOptions judge_options(const Config& config) {
       evemu::folds_by(config.evemu.folds).value_or(evemu::FoldsBy::Position);
   return options;
 }
-
-}  // namespace
 
 std::string artefact_temperature_fault(const evemu::Calibrator& calibrator, std::string_view named,
                                        std::string_view thermometer, std::string_view remedy) {
@@ -113,33 +110,33 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   return {};
 }
 
-Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
-                                        const calib::VolumetricModel* active,
-                                        const std::function<bool()>& stopped) {
+Result<evemu::Observations> evemu_observations(const EvemuRun& run, const Config& config,
+                                               std::optional<int> order,
+                                               std::optional<int> positions) {
   const auto machine = evemu_machine(config.machine);
   ABBE_TRY(machine);
-
-  evemu::ObserveOptions observing;
-  observing.order = config.evemu.order;
-  observing.positions = static_cast<int>(run.asked.plan.positions.size());
-  observing.artefact_temperature = run.artefact;
-  auto observations = evemu::observe(run.touches, run.asked.calibrator, *machine, observing);
+  evemu::ObserveOptions options;
+  options.order = order.value_or(config.evemu.order);
+  options.positions = positions.value_or(static_cast<int>(run.asked.plan.positions.size()));
+  options.artefact_temperature = run.artefact;
+  auto observations = evemu::observe(run.touches, run.asked.calibrator, *machine, options);
   if (!observations) return tl::unexpected(error_of(observations.error()));
+  return *std::move(observations);
+}
 
-  evemu::JudgeOptions judging = judge_options(config);
-  judging.watch.stopped = stopped;
-  auto solution = evemu::solve(*observations, judging.solve);
-  if (solution && run.asked.reference) {
-    const auto& [points, sigma_m] = *run.asked.reference;
-    solution = evemu::with_rotation_reference(std::move(*solution), {points, sigma_m});
-  }
+Result<EvemuCandidate> identify_with_array(EvemuTask task, const calib::VolumetricModel* active) {
+  auto solution = evemu::solve(task.observations, task.judging.solve);
+  if (solution && task.reference)
+    solution = evemu::with_rotation_reference(std::move(*solution),
+                                              {task.reference->points, task.reference->sigma_m});
   if (!solution) return tl::unexpected(error_of(solution.error()));
 
+  const auto& stopped = task.judging.watch.stopped;
   if (stopped && stopped())
     return fail(ErrorCode::DataInsufficient, "identification: stopped before its end");
-  auto verdict = evemu::judge(*observations, *solution, active, judging);
+  auto verdict = evemu::judge(task.observations, *solution, active, task.judging);
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
-  return EvemuCandidate{std::move(*observations), std::move(*solution), std::move(*verdict)};
+  return EvemuCandidate{std::move(task.observations), std::move(*solution), std::move(*verdict)};
 }
 
 }  // namespace abbe::daemon

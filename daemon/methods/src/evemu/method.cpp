@@ -10,6 +10,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/json_vector.hpp"
 #include "abbe/methods/evemu/document.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -136,7 +137,11 @@ EvemuMethod::Run EvemuMethod::run_of(Acquisition&& acquisition) {
 Result<EvemuMethod::Candidate> EvemuMethod::identify(const Run& run, const Config& config,
                                                      const calib::VolumetricModel* active,
                                                      const IdentificationWatch& watch) {
-  return identify_touches(run, config, active, watch.stopped);
+  auto observations = evemu_observations(run, config);
+  ABBE_TRY(observations);
+  EvemuTask task{*std::move(observations), evemu_judge_options(config), run.asked.reference};
+  task.judging.watch.stopped = watch.stopped;
+  return identify_with_array(std::move(task), active);
 }
 
 std::vector<InputFile> EvemuMethod::inputs_of(const Run& run) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <utility>
 
 #include "abbe/base/sha256.hpp"
@@ -29,49 +30,59 @@ double overall(calib::otf::Stage stage, double fraction) {
   return fraction;
 }
 
+calib::Result<calib::otf::Identification> identified(const OtfTask& task,
+                                                     const calib::otf::Machine& machine) {
+  if (!task.scales)
+    return calib::otf::identify(task.points, machine, task.path, task.noise, task.options);
+
+  calib::otf::Options with_scales = task.options;
+  with_scales.encoders = &*task.scales;
+  auto found = calib::otf::identify(task.points, machine, task.path, task.noise, with_scales);
+  if (found || found.error().code != calib::ErrorCode::AlignmentFailed) return found;
+
+  const std::string why = found.error().text;
+  found = calib::otf::identify(task.points, machine, task.path, task.noise, task.options);
+  if (found)
+    found->observations.notes.push_back("the scale readings were not used along the path: " + why);
+  return found;
+}
+
 }  // namespace
 
-Result<IdentifiedRun> identify_observations(const OtfRun& run, const Config& config,
-                                            const calib::VolumetricModel* active,
-                                            const IdentificationWatch& watch) {
-  const auto machine = otf_machine(config.machine);
-  ABBE_TRY(machine);
-  const auto points = otf_observations(run.points);
-  calib::otf::Options options = otf_options(points, config);
-  options.mode = run.mode;
+OtfTask otf_task(const OtfRun& run, const Config& config, const IdentificationWatch& watch) {
+  OtfTask task{.points = otf_observations(run.points),
+               .path = otf_path(run.path_m),
+               .noise = otf_noise(config.machine),
+               .options = {}};
+  task.noise.u_scale = run.u_scale;
+  task.noise.u_axis_scale = run.u_axis_scale;
+  task.options = otf_options(task.points, config);
+  task.options.mode = run.mode;
 
   // A live run has scale readings, and they were found to agree with the path at its vertices.
-  options.orientation.scales_agree = true;
-  if (watch.progress) {
-    options.progress = [&watch](calib::otf::Stage stage, double fraction) {
-      watch.progress(overall(stage, fraction));
+  task.options.orientation.scales_agree = true;
+  task.options.stopped = watch.stopped;
+  if (watch.progress)
+    task.options.progress = [progress = watch.progress](calib::otf::Stage stage, double fraction) {
+      progress(overall(stage, fraction));
     };
-  }
+  return task;
+}
 
-  options.stopped = watch.stopped;
-  calib::otf::Noise noise = otf_noise(config.machine);
-  noise.u_scale = run.u_scale;
-  noise.u_axis_scale = run.u_axis_scale;
-  auto found = calib::otf::identify(points, *machine, otf_path(run.path_m), noise, options);
+Result<IdentifiedRun> identify_otf(const OtfTask& task, const Config& config,
+                                   const calib::VolumetricModel* active) {
+  const auto machine = otf_machine(config.machine);
+  ABBE_TRY(machine);
+  auto found = identified(task, *machine);
   if (!found) return tl::unexpected(error_of(found.error()));
+
   std::vector<RunResiduals> residuals{
       calib::otf::placed_residuals(found->observations, found->solution.residuals)};
   auto verdict =
       calib::otf::judge(found->observations, found->solution, active, gate_limits(config.gate),
-                        options, calib::otf::held_out_into(residuals));
+                        task.options, calib::otf::held_out_into(residuals));
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
-  if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
-
-  return IdentifiedRun{noise, *std::move(found), std::move(*verdict), std::move(residuals)};
-}
-
-Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
-                                  const calib::VolumetricModel* active,
-                                  const IdentificationWatch& watch) {
-  auto identified = identify_observations(run, config, active, watch);
-  ABBE_TRY(identified);
-  return OtfCandidate{std::move(identified->found.solution), std::move(identified->verdict),
-                      run.mode, std::move(identified->residuals), run.temperature_K};
+  return IdentifiedRun{task.noise, *std::move(found), *std::move(verdict), std::move(residuals)};
 }
 
 std::string points_sha256(std::span<const RunPoint> points) {

@@ -11,6 +11,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/document.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -84,7 +85,11 @@ OtfMethod::Run OtfMethod::run_of(Acquisition&& acquisition) {
 Result<OtfMethod::Candidate> OtfMethod::identify(const Run& run, const Config& config,
                                                  const calib::VolumetricModel* active,
                                                  const IdentificationWatch& watch) {
-  return identify_run(run, config, active, watch);
+  auto identified = identify_otf(otf_task(run, config, watch), config, active);
+  ABBE_TRY(identified);
+  if (run.unmeasured_air) identified->verdict.notes.push_back(*run.unmeasured_air);
+  return OtfCandidate{std::move(identified->found.solution), std::move(identified->verdict),
+                      run.mode, std::move(identified->residuals), run.temperature_K};
 }
 
 std::vector<InputFile> OtfMethod::inputs_of(const Run& run) {

@@ -31,7 +31,6 @@ using Candidate = Methods::Candidate;
 [[nodiscard]] std::vector<InputFile> inputs_of(const CalibrationRun& run);
 
 [[nodiscard]] std::string_view method_of(const Candidate& candidate) noexcept;  ///< "otf", "evemu"
-[[nodiscard]] const calib::VolumetricModel& model_of(const Candidate& candidate);
 [[nodiscard]] const calib::Verdict& verdict_of(const Candidate& candidate);
 [[nodiscard]] ModelDocument document_of(const Candidate& candidate, const Config& config,
                                         std::vector<InputFile> inputs, protocol::UtcTime created);

@@ -9,7 +9,7 @@
 ///                       next and take_notes where the operator is guided
 ///     Run               the acquired data: run_of(Acquisition); its member `observed` has the times
 ///                       of the first and the last observation
-///     Candidate         a judged model: model(), verdict
+///     Candidate         a judged model: its member `verdict` has the judgement
 ///     needs(Config)     which devices it reads
 ///     to_json(Request), request_from(json, Config*)
 ///     check(Request, Config), acquire(Request, Options)

@@ -1,10 +1,10 @@
 #pragma once
-/// Identifies a model from touches of a ball array and judges it: observe, solve and judge, with
-/// the estimator of [evemu]. A live session and its replay use the same function. Pure and
+/// Identifies a model from touches of a ball array and judges it. A live session, its replay,
+/// `abbe identify evemu` and `abbe identify joint` use the same function. Pure and
 /// deterministic. It takes a tenth of a second with the default estimator, seconds with lasso, mcp
 /// or scad; the daemon runs it in a separate thread.
 
-#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -19,18 +19,29 @@ struct EvemuCandidate {
   calib::evemu::Observations observations;
   calib::evemu::Solution solution;
   calib::Verdict verdict;
-
-  [[nodiscard]] const calib::VolumetricModel& model() const { return solution.model; }
 };
+
+/// What an identification needs of the touches of an array: live, replayed or from files.
+struct EvemuTask {
+  calib::evemu::Observations observations;
+  calib::evemu::JudgeOptions judging;
+  std::optional<RotationPoints> reference{};  ///< points where V is known
+};
+/// The observations of an acquired run. `order`, `positions`: without a value those of [evemu] and
+/// of the request.
+[[nodiscard]] Result<calib::evemu::Observations> evemu_observations(
+    const EvemuRun& run, const Config& config, std::optional<int> order = {},
+    std::optional<int> positions = {});
+
+/// Of [evemu] and [gate].
+[[nodiscard]] calib::evemu::JudgeOptions evemu_judge_options(const Config& config);
 
 /// Identifies and judges. `active`: the active model, with which the gate compares; null if there
 /// is none. An Error DataInsufficient or BadInput names the position and number of the touches that
-/// caused it. `stopped`: as in IdentificationWatch, polled while the model is judged. A model whose
-/// rotation about Ball1 is not known is refused as "shape only" unless [gate] accepts
-/// "evemu-shape-only".
-[[nodiscard]] Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
-                                                      const calib::VolumetricModel* active,
-                                                      const std::function<bool()>& stopped = {});
+/// caused it. A model whose rotation about Ball1 is not known is refused as "shape only" unless
+/// [gate] accepts "evemu-shape-only".
+[[nodiscard]] Result<EvemuCandidate> identify_with_array(EvemuTask task,
+                                                         const calib::VolumetricModel* active);
 
 [[nodiscard]] calib::evemu::TouchPlan touch_plan(const EvemuConfig& config);
 /// Refused or BadInput if the request cannot give a model: no source of touches is configured, the

@@ -29,8 +29,6 @@ struct MfbCandidate {
   calib::mfb::Identification found;
   calib::Verdict verdict;
   std::optional<calib::mfb::MonteCarlo> monte_carlo;
-
-  [[nodiscard]] const calib::VolumetricModel& model() const { return found.model; }
 };
 
 using MfbProgress = std::function<void(std::string_view step, double share)>;

@@ -1,6 +1,6 @@
 #pragma once
-/// Identifies a model from an acquired run with the estimator of [otf], and judges it. A live
-/// session and its replay use the same function. Pure and deterministic: equal points give
+/// Identifies a model from a run with a laser tracker and judges it. A live session, its replay and
+/// `abbe identify otf` use the same function. Pure and deterministic: equal points give
 /// bit-identical results. It takes about a second; the daemon runs it in a separate thread.
 
 #include <array>
@@ -47,28 +47,33 @@ struct OtfCandidate {
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
   std::vector<RunResiduals> residuals{};  ///< one element, or one per run of several targets
   std::optional<std::array<double, 2>> temperature_K{};  ///< OtfRun::temperature_K
-
-  [[nodiscard]] const calib::VolumetricModel& model() const { return solution.model; }
 };
 
-/// What identify_run() computed, with the observations.
+/// What an identification needs of a run: live, replayed or from files.
+struct OtfTask {
+  std::vector<calib::otf::TrackerObservation> points;
+  calib::otf::Path path;
+  calib::otf::Noise noise;
+  calib::otf::Options options;  ///< with progress and stop
+  /// Scale readings with times of the machine's clock, for the component along the path. Readings
+  /// of another drive are not used: a note in the observations states why.
+  std::optional<calib::otf::EncoderLog> scales{};
+};
+/// Of an acquired run, with the options of [otf].
+[[nodiscard]] OtfTask otf_task(const OtfRun& run, const Config& config,
+                               const IdentificationWatch& watch);
+
 struct IdentifiedRun {
   calib::otf::Noise noise;
   calib::otf::Identification found;
   calib::Verdict verdict;
   std::vector<RunResiduals> residuals;
 };
-/// As identify_run(), for a caller that needs the observations.
-[[nodiscard]] Result<IdentifiedRun> identify_observations(const OtfRun& run, const Config& config,
-                                                          const calib::VolumetricModel* active,
-                                                          const IdentificationWatch& watch = {});
-
 /// Identifies and judges. `active`: the active model, with which the gate compares; null if there
 /// is none. An Error DataInsufficient names what is missing if the run does not determine the
 /// model.
-[[nodiscard]] Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
-                                                const calib::VolumetricModel* active,
-                                                const IdentificationWatch& watch = {});
+[[nodiscard]] Result<IdentifiedRun> identify_otf(const OtfTask& task, const Config& config,
+                                                 const calib::VolumetricModel* active);
 
 /// SHA-256 in hex over the points used in the identification: times, positions and `usable`.
 [[nodiscard]] std::string points_sha256(std::span<const RunPoint> points);

@@ -1,0 +1,61 @@
+#pragma once
+/// What every identification has in common: the active model with which the gate compares, and
+/// where the result goes.
+
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "abbe/base/error.hpp"
+#include "abbe/calib/model/gate.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/model/model_document.hpp"
+
+namespace abbe::daemon {
+
+/// The active model of a store.
+struct ActiveDocument {
+  ModelDocument document;
+  std::string accepted_configuration;  ///< StoreEvent::accepted_configuration of its activation
+};
+
+/// That of the store in which the result will be kept; nullopt if `store` is empty.
+[[nodiscard]] Result<std::optional<ActiveDocument>> active_model(const std::string& store);
+
+/// The model with which the gate compares a candidate.
+struct ComparisonModel {
+  const calib::VolumetricModel* model = nullptr;  ///< null: no comparison
+  /// why the active model is not compared; empty: it is compared, or there is none
+  std::string left_out;
+
+  void add_note(calib::Verdict& verdict) const;  ///< adds `left_out` to the notes of `verdict`
+};
+
+/// The active model, if it was made, or accepted, for the machine of `config`. A model of another
+/// machine configuration is never applied to this machine; so the gate must not compare a new model
+/// with it.
+[[nodiscard]] ComparisonModel comparison_model(const std::optional<ActiveDocument>& active,
+                                               const Config& config);
+
+/// Where a result goes, as the options of the command state.
+struct ResultPlace {
+  std::string out;      ///< folder, created if needed
+  std::string keep;     ///< store, or empty
+  std::string command;  ///< recorded in the store as reason, "abbe identify otf"
+};
+/// File name to text.
+using ResultFiles = std::map<std::string, std::string>;
+
+/// Writes model.json with the verdict, `more` and report.html, adds the model to the store with the
+/// user, and writes report.html again. Nothing is stored if a file cannot be written or the report
+/// cannot be made.
+/// With a store it is the report that `abbe report` makes of the stored model; else it has the
+/// verdict, and states that the model is not active. Error Io, or that of the store.
+[[nodiscard]] Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,
+                                          const calib::Verdict& verdict, const ResultFiles& more);
+
+/// Whether the gate accepts the model, the reasons if not, and the notes.
+[[nodiscard]] nlohmann::json verdict_json(const calib::Verdict& verdict);
+
+}  // namespace abbe::daemon

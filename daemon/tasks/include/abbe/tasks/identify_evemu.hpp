@@ -1,0 +1,30 @@
+#pragma once
+/// A model from a ball array: of touches, of errors that another program computed, or of a
+/// recording.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/methods/evemu/identification.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/tasks/evemu_input.hpp"
+#include "abbe/tasks/progress.hpp"
+
+namespace abbe::daemon {
+
+struct IdentifyEvemuArguments {
+  EvemuInputArguments input;
+  std::string keep;  ///< store with whose active model the gate compares; or empty
+  std::optional<std::string> estimator, folds;  ///< without a value: that of [evemu]
+  bool accept_shape_only = false;
+};
+
+struct EvemuOutcome {
+  EvemuCandidate candidate;
+  ModelDocument document;
+};
+[[nodiscard]] Result<EvemuOutcome> identify_evemu(const IdentifyEvemuArguments&, const Progress&);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,92 @@
+#include "abbe/tasks/identified_model.hpp"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/model/configuration_fit.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/model/model_store.hpp"
+#include "abbe/report/model_report.hpp"
+#include "abbe/result/try.hpp"
+#include "abbe/tasks/forced_use.hpp"
+
+namespace abbe::daemon {
+
+Result<std::optional<ActiveDocument>> active_model(const std::string& store) {
+  if (store.empty()) return std::nullopt;
+  const auto opened = ModelStore::open(store);
+  ABBE_TRY(opened);
+  const auto activation = opened->activation();
+  ABBE_TRY(activation);
+  if (!*activation) return std::nullopt;
+  auto document = opened->load((*activation)->id);
+  ABBE_TRY(document);
+  return ActiveDocument{*std::move(document), (*activation)->accepted_configuration};
+}
+
+void ComparisonModel::add_note(calib::Verdict& verdict) const {
+  if (!left_out.empty()) verdict.notes.push_back(left_out);
+}
+
+ComparisonModel comparison_model(const std::optional<ActiveDocument>& active,
+                                 const Config& config) {
+  if (!active) return {};
+  const auto unfit =
+      unfit_for(active->document, present_configuration(config), active->accepted_configuration);
+  if (!unfit.empty()) return {nullptr, std::string{kOfAnotherMachine}};
+  return {&active->document.model, {}};
+}
+
+namespace {
+
+/// The model as the store has it after it was added.
+Result<ReportSubject> kept(const ResultPlace& place, const ModelDocument& document,
+                           const calib::Verdict& verdict) {
+  auto store = ModelStore::open(place.keep);
+  ABBE_TRY(store);
+  const auto id = store->add(document, verdict.accepted, verdict.reasons,
+                             {user_name(), place.command, document.created});
+  ABBE_TRY(id);
+  return report_subject(*store, *id);
+}
+
+Result<void> write_report(const std::filesystem::path& folder, const ReportSubject& subject) {
+  const auto page = model_report(subject);
+  ABBE_TRY(page);
+  return replace_file(folder / "report.html", *page);
+}
+
+/// A model that is in no store.
+ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdict) {
+  ReportSubject subject{.document = document};
+  subject.entry = StoreEntry{
+      .id = model_id(document), .accepted = verdict.accepted, .reasons = verdict.reasons};
+  return subject;
+}
+
+}  // namespace
+
+Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& identified,
+                            const calib::Verdict& verdict, const ResultFiles& more) {
+  ModelDocument document = identified;
+  document.verdict = model_verdict(verdict);
+  const std::filesystem::path folder = place.out;
+  ABBE_TRY(create_folder(folder));
+  ABBE_TRY(replace_file(folder / "model.json", to_json(document)));
+  for (const auto& [name, text] : more) ABBE_TRY(replace_file(folder / name, text));
+
+  // Before the store: a model that cannot be reported is not kept, and the error says so.
+  ABBE_TRY(write_report(folder, judged(document, verdict)));
+  if (place.keep.empty()) return {};
+  const auto subject = kept(place, document, verdict);
+  ABBE_TRY(subject);
+  return write_report(folder, *subject);
+}
+
+nlohmann::json verdict_json(const calib::Verdict& verdict) {
+  return {{"accepted", verdict.accepted}, {"reasons", verdict.reasons}, {"notes", verdict.notes}};
+}
+
+}  // namespace abbe::daemon

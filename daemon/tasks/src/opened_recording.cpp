@@ -1,0 +1,70 @@
+#include "abbe/tasks/opened_recording.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <utility>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/replay/replay.hpp"
+#include "abbe/result/try.hpp"
+
+namespace abbe::daemon {
+
+Result<OpenedRecording> open_recording(const std::string& file, const std::string& config) {
+  auto reader = RecordingReader::open(file);
+  ABBE_TRY(reader);
+  const auto recorded = recorded_config(*reader, file);
+  auto read = config.empty() ? recorded : load_config(config);
+  ABBE_TRY(read);
+  if (!config.empty()) take_recorded_readings(*read, recorded ? &*recorded : nullptr);
+  const auto hash = sha256_hex_of_file(file);
+  ABBE_TRY(hash);
+  return OpenedRecording{std::move(*reader),
+                         std::move(*read),
+                         {std::filesystem::path(file).filename().string(), *hash}};
+}
+
+namespace {
+
+/// [[thermal]] of `config`, with the temperatures that `recorded` has by the same name.
+std::vector<ThermalConfig> thermal_of_recorded(const Config& config, const Config& recorded) {
+  std::vector<ThermalConfig> all;
+  for (ThermalConfig thermal : config.thermal) {
+    const auto at =
+        std::ranges::find(recorded.temperatures, config.temperatures[thermal.temperature]);
+    if (at == recorded.temperatures.end()) continue;
+    thermal.temperature = static_cast<std::uint8_t>(at - recorded.temperatures.begin());
+    all.push_back(std::move(thermal));
+  }
+  return all;
+}
+
+/// Which recorded sensors correct a reading follows from [[thermal]], which stays that of `config`.
+void take_recorded_sensors(Config& config, const Config& recorded) {
+  Config sensors = recorded;
+  sensors.thermal = thermal_of_recorded(config, recorded);
+  const auto [readings, measurements] = environment_meaning(sensors);
+  const auto take = [](MeaningEntries& entries, const MeaningEntries& taken) {
+    std::erase_if(entries, [](const auto& entry) { return entry.key.starts_with("environment."); });
+    for (const auto& [key, value] : taken) set_entry(entries, key, value);
+  };
+  take(config.meaning.readings, readings);
+  take(config.meaning.measurements, measurements);
+}
+
+}  // namespace
+
+void take_recorded_readings(Config& config, const Config* recorded) {
+  auto& [readings, measurements] = config.meaning;
+  if (recorded == nullptr) {
+    set_entry(readings, "daemon.simulated", "not known");
+    return;
+  }
+  take_entries(readings, recorded->meaning.readings,
+               {"machine", "axes", "target", "model", "thermal"});
+  measurements = recorded->meaning.measurements;
+  take_recorded_sensors(config, *recorded);
+}
+
+}  // namespace abbe::daemon

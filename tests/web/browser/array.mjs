@@ -42,7 +42,7 @@ function lagging(marks) {
 function faultsOf(marks) {
   const faults = lagging(marks);
   const beforeBall4 = ["ball 1", "block 1", "block 2", "ball 2", "ball 3"];
-  // The balls are asked for at every position. A block is asked for shortly and only at some: a busy
+  // The balls are asked for at every position. A block is asked for briefly and only at some: a busy
   // computer may show the page nothing of one of them, so that what the text asked for is compared (lagging).
   for (const on of ["ball 1", "ball 2", "ball 3", "ball 4"])
     if (!marks.some((m) => m.next === on)) faults.push(`the drawing has never marked ${on}`);

@@ -140,7 +140,7 @@ std::string feed(const Options& options, ControlLink& link, LatestUsable& latest
   linuxcnc::FeedOptions feed_options;
   feed_options.clamp_m = options.clamp_mm * kMillimetre;
   const auto& t = options.tool_offset_mm;
-  feed_options.tool_offset_at_zero_m = calib::Vector3(t[0], t[1], t[2]) * kMillimetre;
+  feed_options.tool_offset_at_zero_m = Eigen::Vector3d(t[0], t[1], t[2]) * kMillimetre;
   timespec next{};
   ::clock_gettime(CLOCK_MONOTONIC, &next);
 

@@ -47,9 +47,11 @@ Result<std::vector<calib::Vector3>> trackers_of(const PlanOtfArguments& argument
   if (trackers.empty() && machine.tracker_position_m)
     trackers.emplace_back(machine.tracker_position_m->data());
   if (trackers.empty())
-    return fail(ErrorCode::Usage,
-                "plan otf: the position of the tracker is unknown: --tracker-at x,y,z in machine "
-                "coordinates, or [tracker] position_mm in the configuration");
+    return fail(
+        ErrorCode::Usage,
+        fmt::format("plan otf: the position of the tracker is unknown: --tracker-at x,y,z in "
+                    "machine coordinates, or {} position_mm in the configuration",
+                    tables_with(Capability::TrackerPoints)));
   return trackers;
 }
 

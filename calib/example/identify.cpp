@@ -1,5 +1,6 @@
 // Identifies the errors of a simulated machine from tracker points on the fly, and compares the
 // model with the errors that are known here. All values in SI units.
+#include <abbe/calib/model/model_comparison.hpp>
 #include <abbe/calib/otf/identify/identify.hpp>
 #include <abbe/calib/otf/plan/plan.hpp>
 #include <algorithm>
@@ -15,14 +16,14 @@ namespace otf = abbe::calib::otf;
 
 /// True position minus scale reading: positioning and straightness of X, positioning of Z.
 Vector3 known_V_m(const Vector3& q_m) {
-  const double x = q_m.x() / 0.3, z = q_m.z() / 0.2;
+  const double x = q_m.x() / 0.3, z = q_m.z() / 0.4;
   return {8e-6 * x * x, 5e-6 * x * (1.0 - x), -6e-6 * z};
 }
 
 /// Points of a tracker at `tracker_m` while the machine drives the path, standing at both ends.
 std::vector<otf::TrackerObservation> drive(const otf::Machine& machine, const otf::Path& path,
                                            const Vector3& tracker_m, const otf::Noise& noise) {
-  constexpr double kFeed_m_per_s = 0.05, kPeriod_s = 0.01, kStand_s = 2.0;
+  constexpr double kFeed_m_per_s = 0.04, kPeriod_s = 0.01, kStand_s = 2.0;
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   std::vector<otf::TrackerObservation> points;
@@ -58,13 +59,24 @@ int main() {
   // Workpiece table on X, then the bed, then Y and Z with the tool.
   const auto chain = abbe::calib::KinematicChain::parse("[w X' b Y Z t]");
   const auto x = abbe::calib::equidistant_nodes(-0.3, 0.3);
-  const auto yz = abbe::calib::equidistant_nodes(-0.2, 0.2);
-  const otf::Machine machine{*chain, {*x, *yz, *yz}, {0.0, 0.0, -0.1}};
-  const otf::Path path = otf::base_path(machine.nodes);
+  const auto y = abbe::calib::equidistant_nodes(-0.25, 0.25);
+  const auto z = abbe::calib::equidistant_nodes(-0.4, 0.0);
+  const otf::Machine machine{*chain, {*x, *y, *z}, {0.02, -0.015, -0.12}};
   const otf::Noise noise{.sigma_range_m = 2e-6, .sigma_angle_rad = 3e-6};
+  const Vector3 tracker_m(-0.9, -0.7, -0.3);
 
-  const auto points = drive(machine, path, {-0.9, -0.7, 0.1}, noise);
-  const auto found = otf::identify(points, machine, path, noise);
+  const otf::PlannedRun run{.machine = machine, .tracker_m = tracker_m, .noise = noise};
+  const auto plan = otf::plan(run, {.length_m = 40.0}, {.lattice = 3, .exchanges = 0});
+  if (!plan) {
+    std::cerr << "plan: " << plan.error().text << '\n';
+    return 1;
+  }
+  const otf::Path& path = plan->path;
+
+  const auto points = drive(machine, path, tracker_m, noise);
+  otf::Options options;
+  options.block_samples = 20;  // 8 mm of travel
+  const auto found = otf::identify(points, machine, path, noise, options);
   if (!found) {
     std::cerr << "identify: " << found.error().text << '\n';
     return 1;
@@ -82,7 +94,7 @@ int main() {
   const auto left = abbe::calib::rigid_free(places_m, difference_m);
   if (!left) return 1;
 
-  const auto at_centre = model.error_at(Vector3::Zero(), machine.target_offset_m);
+  const auto at_centre = model.error_at({0.0, 0.0, -0.2}, machine.target_offset_m);
   std::cout << points.size() << " points; largest |V| " << 1e6 * before_m << " um\n"
             << "left with the model: " << 1e6 * left->rigid_free.rms_m << " um rms, largest "
             << 1e6 * left->rigid_free.max_m << " um\n"

@@ -195,7 +195,7 @@ fault(lambda: abbe.verify(sys.argv[1]))
             HasSubstr("usage: --mode: \"stand-still\": must be on-the-fly, standstill"),
             HasSubstr("usage: --artefact-C and --u-artefact-K: give both"),
             HasSubstr("usage: identify mfb needs --plan"),
-            HasSubstr("usage: verify: give --points, --recording or --live")));
+            HasSubstr("usage: verify: give points or recording")));
   EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 12);
 }
 

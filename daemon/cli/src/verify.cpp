@@ -8,19 +8,15 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
-#include <system_error>
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/fit/points_off.hpp"
-#include "abbe/config/calib_error.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "abbe/tasks/effect_name.hpp"
-#include "abbe/tasks/vector_option.hpp"
 #include "abbe/tasks/verification_report.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"

@@ -76,6 +76,7 @@ export function show(place) {
   place.append(h("h2", {}, "Axes"), cards, h("h2", {}, "Streams"), streams, below);
   let showPositions = () => {};
   let axesShown = "", pending = false;
+  const showLatest = () => showPositions(state.lost ? null : state.live);
 
   const onStatus = (status) => {
     if (!status) return;
@@ -84,6 +85,7 @@ export function show(place) {
       axesShown = names;
       cards.replaceChildren();
       showPositions = axisCards(cards, status.axes);
+      showLatest();
     }
     // A table that has the focus, for scrolling, is replaced later.
     if (!streams.contains(document.activeElement))
@@ -98,7 +100,7 @@ export function show(place) {
     pending = true;
     requestAnimationFrame(() => {
       pending = false;
-      showPositions(state.lost ? null : state.live);
+      showLatest();
     });
   };
 

@@ -28,10 +28,12 @@ async function firstView({ page }) {
 
 /** X, Y, Z in mm; B and C, which swing by 0.1 rad, in degrees. The positions come after the page. */
 async function axesFaults({ page }) {
-  await page.waitForFunction(() => [...document.querySelectorAll(".axis .value")]
-    .every((value) => value.innerText.match(/[0-9]/)), { timeout: 10000 }).catch(() => {});
-  const shown = await page.$$eval(".axis", (cards) => cards.map((c) =>
-    [c.querySelector(".name").innerText, c.querySelector(".value").innerText]));
+  const shown = await page.waitForFunction(() => {
+    const cards = [...document.querySelectorAll(".axis")].map((c) =>
+      [c.querySelector(".name").innerText, c.querySelector(".value").innerText]);
+    return cards.length > 0 && cards.every(([, value]) => /[0-9]/.test(value)) && cards;
+  }, { timeout: 10000 }).then((cards) => cards.jsonValue()).catch(() => null);
+  if (!shown) return [`an axis shows no position for 10 s: ${await page.$eval("#view", (view) => view.innerText)}`];
   const [names, values] = [0, 1].map((i) => shown.map((card) => card[i]));
   const right = names.join("") === "XYZBC" && values.every((v, i) =>
     i < 3 ? /^-?[0-9.]+ mm$/.test(v) : /^-?[0-9.]+ \u00b0$/.test(v) && Math.abs(parseFloat(v)) < 6);

@@ -1,13 +1,14 @@
-// Every view in three sizes, dark and light, with the controls of an administrator: shown without an
-// error, accessible by axe-core, kept as a screenshot; the 3-D view under finger and mouse; the trends;
-// what the system prefers.   views.mjs URL FOLDER PASSWORD [LONGEST_MS]
+// Every view with the controls of an administrator, dark on a telephone and light on a desk (in the size
+// that ABBE_PAGE_SIZE names: both): shown without an error, accessible by axe-core, kept as a screenshot.
+// On a desk the trends, the keyboard and what the system prefers.   views.mjs URL FOLDER PASSWORD [LONGEST_MS]
 // LONGEST_MS: a first view that takes longer is a fault; without it the time is only printed.
 
-import { clickButton, drag, goTo, logIn, middleOf, nextFrame, press, resize, say, screenshot, viewports, violations, waitForText,
+import { clickButton, drag, goTo, logIn, middleOf, nextFrame, press, resize, say, screenshot, violations, waitForText,
   withPage } from "./chromium.mjs";
 
 const [url, out, password, longest_ms] = process.argv.slice(2);
 const kTables = 14;  // that a target at a constant offset shows
+const kLooks = process.env.ABBE_PAGE_SIZE ? { [process.env.ABBE_PAGE_SIZE]: ["dark", "light"] } : { phone: ["dark"], desk: ["light"] };
 const views = ["live", "calibration", "model", "history", "recordings", "configuration"];
 
 /** The first view: time from the request to the first positions. The shortest of three: what other
@@ -227,10 +228,10 @@ await withPage(url, out, async (context) => {
   faults.push(...await axesFaults(context));
   await logIn(context, "administer", password);
   let checked = 0;
-  for (const size of Object.keys(viewports)) {
+  for (const [size, schemes] of Object.entries(kLooks)) {
     await resize(context, size);
     await waitForText(context, "Log out", "#log-in");
-    for (const scheme of ["dark", "light"]) {
+    for (const scheme of schemes) {
       await prefer(context, { scheme });
       if (await theme(context) !== scheme) faults.push(`${size}: the page does not follow the ${scheme} theme of the system`);
       for (const view of views) {
@@ -243,6 +244,7 @@ await withPage(url, out, async (context) => {
     }
     faults.push(...await turns(context, size));
   }
+  await resize(context, "desk");
   say(`views checked ${checked}`);
   return [...faults, ...await trends(context), ...await keyboard(context), ...await themes(context),
     ...await preferences(context)];

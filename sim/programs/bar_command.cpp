@@ -15,7 +15,6 @@
 #include "clamping_loop.hpp"
 #include "commands.hpp"
 #include "setup_file.hpp"
-#include "toml_section.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -39,15 +38,16 @@ mfb::GaugeTravel travel_of(std::string_view word) {
 }
 
 mfb::StepGauge gauge_of(const ReversalCommandOptions& o) {
-  return {.step_m = o.gauge_step_mm * kMilli,
-          .u_m = o.u_gauge_um * kMicro,
-          .u_per_m = o.u_gauge_um_per_m * kMicro,
-          .temperature_C = o.temperature_C,
-          .beside_bar_m = {0.0, o.gauge_beside_mm[0] * kMilli, o.gauge_beside_mm[1] * kMilli},
-          .turned_rad = {o.gauge_turned_mrad[0] * kMilli, o.gauge_turned_mrad[1] * kMilli},
-          .alignment_rad = o.gauge_alignment_mrad * kMilli,
-          .travel = travel_of(o.gauge_travel),
-          .u_rotation_rad = o.u_rotation_urad * kMicro};
+  return {
+      .step_m = o.gauge_step_mm * kFromMilli,
+      .u_m = o.u_gauge_um * kFromMicro,
+      .u_per_m = o.u_gauge_um_per_m * kFromMicro,
+      .temperature_C = o.temperature_C,
+      .beside_bar_m = {0.0, o.gauge_beside_mm[0] * kFromMilli, o.gauge_beside_mm[1] * kFromMilli},
+      .turned_rad = {o.gauge_turned_mrad[0] * kFromMilli, o.gauge_turned_mrad[1] * kFromMilli},
+      .alignment_rad = o.gauge_alignment_mrad * kFromMilli,
+      .travel = travel_of(o.gauge_travel),
+      .u_rotation_rad = o.u_rotation_urad * kFromMicro};
 }
 
 void without_errors(mfb::StepGauge& gauge) {
@@ -67,14 +67,14 @@ struct Reversal {
 Result<Reversal> reversal_of(const ReversalCommandOptions& options) {
   auto stated = probing_of(options);
   ABBE_TRY(stated);
-  stated->shape_scatter_m = options.shape_scatter_um * kMicro;
+  stated->shape_scatter_m = options.shape_scatter_um * kFromMicro;
   Reversal out{
       *stated,
       bar_of(options),
-      mfb::measuring_machine(options.mean_error_um * kMicro, options.length_m(), options.seed),
+      mfb::measuring_machine(options.mean_error_um * kFromMicro, options.length_m(), options.seed),
       gauge_of(options),
       {.repeats = options.repeats,
-       .inclination_rad = options.inclined_mrad * kMilli,
+       .inclination_rad = options.inclined_mrad * kFromMilli,
        .planned_inclination_rad = 0.0,
        .probing = simulated(*stated, options)}};
   out.applied.gauge = out.gauge;
@@ -88,7 +88,7 @@ Result<void> write_files(const ReversalCommandOptions& options, const Reversal& 
   constexpr double kTolerance_um = 50.0;  // of the maker
   const mfb::TrueBar& bar = reversal.bar;
   mfb::StatedBar nominal =
-      mfb::nominal_bar(bar.pattern, Eigen::Vector3d::Constant(kTolerance_um * kMicro));
+      mfb::nominal_bar(bar.pattern, Eigen::Vector3d::Constant(kTolerance_um * kFromMicro));
   set_properties(nominal, reversal.stated);
   std::vector<NamedText> files = std::move(points);
   files.push_back({"nominal.toml", mfb::format_bar_toml(nominal)});

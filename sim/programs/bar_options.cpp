@@ -8,7 +8,6 @@
 
 #include "abbe/result/try.hpp"
 #include "files.hpp"
-#include "toml_section.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -74,7 +73,7 @@ Result<void> add_outliers(const BarOptions& o, mfb::ProbingOptions& probing) {
     if (std::from_chars(outlier->value.data(), end, um).ptr != end || outlier->value.empty())
       return usage_error(
           fmt::format("--outlier \"{}\": \"{}\" is not a number of um", text, outlier->value));
-    probing.wrong_m[outlier->name] = um * kMicro;
+    probing.wrong_m[outlier->name] = um * kFromMicro;
   }
   return {};
 }
@@ -109,29 +108,29 @@ void add_bar_options(CLI::App& app, BarOptions& options) {
 
 mfb::TrueBar bar_of(const BarOptions& options) {
   return mfb::random_bar(
-      mfb::reference_pattern(options.holes, options.pitch_mm * kMilli),
-      {.form_m = options.form_um * kMicro, .seed = options.bar_seed.value_or(options.seed)});
+      mfb::reference_pattern(options.holes, options.pitch_mm * kFromMilli),
+      {.form_m = options.form_um * kFromMicro, .seed = options.bar_seed.value_or(options.seed)});
 }
 
 Result<mfb::ProbingOptions> probing_of(const BarOptions& o) {
   mfb::ProbingOptions probing;
   probing.seed = o.seed;
-  probing.probe = {.tip_radius_m = o.tip_radius_mm * kMilli,
-                   .noise_m = o.probe_um * kMicro,
-                   .lobing_m = o.lobing_um * kMicro,
-                   .delay_s = o.delay_ms * kMilli,
+  probing.probe = {.tip_radius_m = o.tip_radius_mm * kFromMilli,
+                   .noise_m = o.probe_um * kFromMicro,
+                   .lobing_m = o.lobing_um * kFromMicro,
+                   .delay_s = o.delay_ms * kFromMilli,
                    .feed_m_per_s = o.feed_mm_per_min * kMmPerMinute,
                    .feed_scatter = 0.01 * o.feed_scatter_percent};
-  probing.machine_noise_m = o.machine_um * kMicro;
-  probing.clamping_m = o.clamping_mm * kMilli;
-  probing.clamping_rad = o.clamping_mrad * kMilli;
+  probing.machine_noise_m = o.machine_um * kFromMicro;
+  probing.clamping_m = o.clamping_mm * kFromMilli;
+  probing.clamping_rad = o.clamping_mrad * kFromMilli;
   probing.temperature = {.stated_C = o.temperature_C,
                          .spread_K = o.temperature_spread_K,
                          .u_K = o.u_temperature_K,
-                         .alpha_per_K = o.alpha_um_per_m_K * kMicro,
-                         .u_alpha_per_K = o.u_alpha_um_per_m_K * kMicro};
+                         .alpha_per_K = o.alpha_um_per_m_K * kFromMicro,
+                         .u_alpha_per_K = o.u_alpha_um_per_m_K * kFromMicro};
   if (!o.stiff)
-    probing.sag = mfb::reference_sag(mfb::reference_pattern(o.holes, o.pitch_mm * kMilli));
+    probing.sag = mfb::reference_sag(mfb::reference_pattern(o.holes, o.pitch_mm * kFromMilli));
   probing.missed.insert(o.missed.begin(), o.missed.end());
 
   return add_outliers(o, probing).and_then([&] { return add_turned(o, probing); }).map([&] {

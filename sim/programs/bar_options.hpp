@@ -15,6 +15,9 @@ class App;
 
 namespace abbe::sim {
 
+inline constexpr double kFromMilli = 1e-3;
+inline constexpr double kFromMicro = 1e-6;
+
 struct BarOptions {
   std::string folder;
   std::uint64_t seed = 1;

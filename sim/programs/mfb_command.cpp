@@ -15,7 +15,6 @@
 #include "bar_options.hpp"
 #include "commands.hpp"
 #include "setup_file.hpp"
-#include "toml_section.hpp"
 #include "touching_loop.hpp"
 
 namespace abbe::sim {
@@ -49,7 +48,7 @@ TruthMachine cube_machine(const MfbOptions& options) {
   TruthMachine machine;
   for (const Axis axis : kAxes) machine.axis(axis).range = {0.0, options.length_m(), 0.0};
   return random_truth(machine, {.seed = options.seed,
-                                .mean_error_m = options.mean_error_um * kMicro,
+                                .mean_error_m = options.mean_error_um * kFromMicro,
                                 .node_spacing_m = 0.005,
                                 .beyond_m = 0.025,
                                 .shape = Shape::Cubic,
@@ -58,7 +57,7 @@ TruthMachine cube_machine(const MfbOptions& options) {
 
 Result<mfb::ProbingOptions> stated_options(const MfbOptions& options) {
   auto stated = probing_of(options);
-  if (stated) stated->drift_m = options.drift_um * kMicro;
+  if (stated) stated->drift_m = options.drift_um * kFromMicro;
   return stated;
 }
 
@@ -69,7 +68,8 @@ std::string verification_csv(TruthMachine machine, const Eigen::Vector3d& tool_o
   std::string text = fmt::format(
       "# the true place of the tip of the tool with the offset {:g},{:g},{:g} mm\n"
       "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n",
-      tool_offset_m.x() / kMilli, tool_offset_m.y() / kMilli, tool_offset_m.z() / kMilli);
+      tool_offset_m.x() / kFromMilli, tool_offset_m.y() / kFromMilli,
+      tool_offset_m.z() / kFromMilli);
   const auto at = [&](Axis axis, int i) {
     const AxisRange& r = machine.axis(axis).range;
     return r.min_m + (r.max_m - r.min_m) * i / (kPerAxis - 1);
@@ -78,7 +78,7 @@ std::string verification_csv(TruthMachine machine, const Eigen::Vector3d& tool_o
   for (int i = 0; i < kPerAxis * kPerAxis * kPerAxis; ++i) {
     const Eigen::Vector3d q_m(at(Axis::X, i / (kPerAxis * kPerAxis)),
                               at(Axis::Y, i / kPerAxis % kPerAxis), at(Axis::Z, i % kPerAxis));
-    const Eigen::Vector3d q_mm = q_m / kMilli, p_mm = position_m(machine, q_m) / kMilli;
+    const Eigen::Vector3d q_mm = q_m / kFromMilli, p_mm = position_m(machine, q_m) / kFromMilli;
     text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", q_mm.x(), q_mm.y(),
                         q_mm.z(), p_mm.x(), p_mm.y(), p_mm.z());
   }
@@ -135,7 +135,7 @@ int run(const MfbOptions& options) {
   auto probed = mfb::probe_bar(machine, bar, plan, simulated(*stated, options));
   if (!probed) return report(as_usage(probed.error()));
 
-  const Eigen::Vector3d u_bar_m = kMicro * Eigen::Vector3d(options.u_bar_um.data());
+  const Eigen::Vector3d u_bar_m = kFromMicro * Eigen::Vector3d(options.u_bar_um.data());
   mfb::StatedBar calibrated = mfb::calibrated_bar(bar, u_bar_m, options.seed);
   if (options.exact) {
     calibrated.O_m = mfb::calibrated_bar(bar, Eigen::Vector3d::Zero(), options.seed).O_m;
@@ -144,7 +144,7 @@ int run(const MfbOptions& options) {
   const std::string name = fmt::format("simulated, seed {}", options.seed);
   const auto written = write_folder(
       options.folder,
-      {{"machine.toml", mfb::format_machine_toml(machine, name, options.pitch_mm * kMilli)},
+      {{"machine.toml", mfb::format_machine_toml(machine, name, options.pitch_mm * kFromMilli)},
        {"bar.toml", mfb::format_bar_toml(calibrated)},
        {"plan.toml", mfb::format_plan_toml(plan, *probed, *stated)},
        {"points.csv", mfb::format_points_csv(plan, *probed)},
@@ -154,7 +154,7 @@ int run(const MfbOptions& options) {
        {"verification.csv", verification_csv(machine, plan.front().tool_offset_m)}});
   if (!written) return report(written.error());
   fmt::print("{} touches in {} passes; mean |V| {:.1f} um; files in {}\n", probed->touches.size(),
-             plan.size(), mean_error_m(machine) / kMicro, options.folder);
+             plan.size(), mean_error_m(machine) / kFromMicro, options.folder);
   return options.live.choices.config_file.empty() ? kDone
                                                   : run_live(options, machine, *std::move(probed));
 }

@@ -10,16 +10,15 @@ namespace {
 
 /// Reads the keys of one quantity: its mean from NAME_UNIT; NAME_drift_per_hour, NAME_swing and
 /// NAME_swing_period_s.
-void read_course(TomlSection& section, std::string_view name, std::string_view unit,
-                 Course& course) {
-  section.number(fmt::format("{}_{}", name, unit), course.mean);
-  section.number(fmt::format("{}_drift_per_hour", name), course.drift_per_hour);
-  section.number(fmt::format("{}_swing", name), course.swing);
-  section.number(fmt::format("{}_swing_period_s", name), course.swing_period_s, 1.0,
-                 kPositiveNumber);
+void read_course(Section& section, std::string_view name, std::string_view unit, Course& course) {
+  section.get(fmt::format("{}_{}", name, unit), course.mean, kPlain, kAnyNumber);
+  section.get(fmt::format("{}_drift_per_hour", name), course.drift_per_hour, kPlain, kAnyNumber);
+  section.get(fmt::format("{}_swing", name), course.swing, kPlain, kAnyNumber);
+  section.get(fmt::format("{}_swing_period_s", name), course.swing_period_s, kPlain,
+              kPositiveNumber);
 }
 
-void read_model(TomlSection& section, EnvironmentModel& model) {
+void read_model(Section& section, EnvironmentModel& model) {
   read_course(section, "air_temperature", "C", model.air_temperature_C);
   read_course(section, "air_pressure", "hPa", model.air_pressure_hPa);
   read_course(section, "humidity", "percent", model.relative_humidity_percent);
@@ -27,11 +26,12 @@ void read_model(TomlSection& section, EnvironmentModel& model) {
     read_course(section, fmt::format("input{}", i), "C", model.temperature_C[i]);
 }
 
-void read_endpoint(TomlSection& section, ModbusServerOptions& options) {
+void read_endpoint(Section& section, ModbusServerOptions& options) {
   std::uint16_t port = 0;
   std::string link;
-  const bool on_terminal = section.text("link", link);
-  if (section.port("port", port) && on_terminal) section.fault("port", "has no meaning with link");
+  const bool on_terminal = section.get("link", link);
+  if (get_port(section, "port", port) && on_terminal)
+    section.fault("port", "has no meaning with link");
   if (on_terminal) {
     options.endpoint = ModbusPtyEndpoint{link};
   } else {
@@ -39,11 +39,11 @@ void read_endpoint(TomlSection& section, ModbusServerOptions& options) {
   }
 }
 
-ModbusServerOptions read_device(TomlSection& section) {
+ModbusServerOptions read_device(Section& section) {
   ModbusServerOptions options;
-  if (!section.text("name", options.name)) section.fault("name", "missing");
+  section.get("name", options.name, Need::Required);
   std::string model;
-  section.text("model", model);
+  section.get("model", model);
 
   if (const auto known = modbus_model(model)) {
     options.identity.model = *known;
@@ -51,23 +51,19 @@ ModbusServerOptions read_device(TomlSection& section) {
     section.fault("model", "must be \"indigo520_hmp\", \"comet_t7510\" or \"zt2005_c8\"");
   }
 
-  std::int64_t serial_number = options.identity.serial_number;
-  std::int64_t unit = options.identity.unit;
-  if (section.integer("serial_number", serial_number, 0, 99'999'999))
-    options.identity.serial_number = static_cast<std::uint32_t>(serial_number);
-  if (section.integer("unit", unit, 1, 247))
-    options.identity.unit = static_cast<std::uint8_t>(unit);
+  section.get_integer("serial_number", options.identity.serial_number, 0, 99'999'999);
+  section.get_integer("unit", options.identity.unit, 1, 247);
   read_endpoint(section, options);
   read_model(section, options.environment);
-  section.refuse_unknown_keys();
+  section.close(Hint::AllKeys);
 
   return options;
 }
 
 }  // namespace
 
-void read_environment(TomlSection& sim, std::vector<ModbusServerOptions>& devices) {
-  for (TomlSection& section : sim.children("environment")) {
+void read_environment(Section& sim, std::vector<ModbusServerOptions>& devices) {
+  for (Section& section : sim.children("environment")) {
     auto device = read_device(section);
     const auto same = [&](const ModbusServerOptions& d) { return d.name == device.name; };
     if (std::any_of(devices.begin(), devices.end(), same)) section.fault("name", "is used twice");

@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "abbe/sim/modbus_server.hpp"
-#include "toml_section.hpp"
+#include "toml_file.hpp"
 
 namespace abbe::sim {
 
-void read_environment(TomlSection& sim, std::vector<ModbusServerOptions>& devices);
+void read_environment(Section& sim, std::vector<ModbusServerOptions>& devices);
 
 }  // namespace abbe::sim

@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "abbe/sim/fault.hpp"
-#include "toml_section.hpp"
+#include "toml_file.hpp"
 
 namespace abbe::sim {
 
-void read_faults(TomlSection& sim, std::vector<ScheduledFault>& faults);
+void read_faults(Section& sim, std::vector<ScheduledFault>& faults);
 
 }  // namespace abbe::sim

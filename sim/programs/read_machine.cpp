@@ -16,55 +16,52 @@
 namespace abbe::sim {
 namespace {
 
-void read_axes(TomlSection root, TruthMachine& truth) {
-  TomlSection axes = root.child("axes");
+void read_axes(Section root, TruthMachine& truth) {
+  Section axes = root.child("axes");
   if (!axes.present()) return root.fault("axes", "missing");
   for (const Axis axis : kAxes) {
     const std::string_view name = kAxisLetters.substr(static_cast<std::size_t>(axis), 1);
-    TomlSection section = axes.child(name);
+    Section section = axes.child(name);
     AxisRange& range = truth.axis(axis).range;
-    const bool has_min = section.number("min_mm", range.min_m, kMilli);
-    const bool has_max = section.number("max_mm", range.max_m, kMilli);
+    const bool has_min = section.get("min_mm", range.min_m, kMilli, kAnyNumber);
+    const bool has_max = section.get("max_mm", range.max_m, kMilli, kAnyNumber);
     if (!has_min || !has_max) {
       section.fault("", "needs min_mm and max_mm");
     } else if (range.min_m >= range.max_m) {
       section.fault("max_mm", "must exceed min_mm");
     }
     range.reference_m = range.min_m <= 0.0 && range.max_m >= 0.0 ? 0.0 : range.min_m;
-    section.number("reference_mm", range.reference_m, kMilli);
+    section.get("reference_mm", range.reference_m, kMilli, kAnyNumber);
   }
 }
 
-void read_linear_scale(TomlSection& section, EncoderNodeOptions& node) {
+void read_linear_scale(Section& section, EncoderNodeOptions& node) {
   double step_nm = 1.0;  // as abbed reads the file
-  section.number("step_nm", step_nm, 1.0, {1.0, 1e9});
-  section.number("offset_mm", node.offset, kMilli);
+  section.get("step_nm", step_nm, kPlain, {1.0, 1e9});
+  section.get("offset_mm", node.offset, kMilli, kAnyNumber);
   node.step_nm = static_cast<std::uint32_t>(step_nm);
   if (step_nm != node.step_nm)
     section.fault("step_nm", "must be a whole number: object 6005h has no fractions");
 }
 
-void read_rotary_scale(TomlSection& section, EncoderNodeOptions& node) {
+void read_rotary_scale(Section& section, EncoderNodeOptions& node) {
   double step_nrad = 0.0;
-  if (section.number("step_nrad", step_nrad, 1.0, {2.0, 1e9}))
+  if (section.get("step_nrad", step_nrad, kPlain, {2.0, 1e9}, Need::Required))
     node.units_per_revolution =
         static_cast<std::uint32_t>(std::lround(2e9 * std::numbers::pi / step_nrad));
-  else
-    section.fault("step_nrad", "missing, or not a number from 2 to 1e9");
-  section.number("offset_rad", node.offset, 1.0);
+  section.get("offset_rad", node.offset, kPlain, kAnyNumber);
 }
 
-bool is_rotary(TomlSection root, const std::string& name) {
+bool is_rotary(Section root, const std::string& name) {
   std::string kind;
-  TomlSection axis = root.child("axes").child(name);
-  return axis.present() && axis.text("kind", kind) && kind == "rotary";
+  Section axis = root.child("axes").child(name);
+  return axis.present() && axis.get("kind", kind) && kind == "rotary";
 }
 
-std::optional<EncoderNodeOptions> read_encoder_node(TomlSection root, TomlSection& section) {
+std::optional<EncoderNodeOptions> read_encoder_node(Section root, Section& section) {
   EncoderNodeOptions node;
   std::string name;
-  std::int64_t id = 0;
-  section.text("axis", name);
+  section.get("axis", name);
 
   if (const auto axis = axis_named(name)) {
     node.axis = *axis;
@@ -77,15 +74,15 @@ std::optional<EncoderNodeOptions> read_encoder_node(TomlSection root, TomlSectio
     return std::nullopt;
   }
 
-  if (!section.integer("node", id, 1, can::kMaxNodeId)) section.fault("node", "missing");
-  section.flag("invert", node.invert);
-  node.node = static_cast<can::NodeId>(id);
+  node.node = 0;
+  section.get_integer("node", node.node, 1, can::kMaxNodeId, Need::Required);
+  section.get("invert", node.invert);
 
   return node;
 }
 
 /// Those of X, Y and Z, and one on each rotary axis: they exist without an entry in the file.
-void add_rotary_nodes(TomlSection root, std::vector<EncoderNodeOptions>& nodes) {
+void add_rotary_nodes(Section root, std::vector<EncoderNodeOptions>& nodes) {
   for (const std::string& name : root.child("axes").keys()) {
     if (!is_rotary(root, name)) continue;
     EncoderNodeOptions node;
@@ -95,10 +92,9 @@ void add_rotary_nodes(TomlSection root, std::vector<EncoderNodeOptions>& nodes) 
   }
 }
 
-void read_encoder_nodes(TomlSection root, TomlSection& encoder,
-                        std::vector<EncoderNodeOptions>& nodes) {
+void read_encoder_nodes(Section root, Section& encoder, std::vector<EncoderNodeOptions>& nodes) {
   std::vector<EncoderNodeOptions> seen;
-  for (TomlSection& section : encoder.children("nodes"))
+  for (Section& section : encoder.children("nodes"))
     if (const auto node = read_encoder_node(root, section)) {
       if (node->node != 0 && std::ranges::count(seen, node->node, &EncoderNodeOptions::node) > 0)
         section.fault("node", fmt::format("node id {} is used twice", node->node));
@@ -109,18 +105,18 @@ void read_encoder_nodes(TomlSection root, TomlSection& encoder,
 }
 
 /// With sync = "external" the control of the machine sends the SYNC; the simulator does it.
-void read_sync(TomlSection& encoder, SimulationSetup& simulation) {
+void read_sync(Section& encoder, SimulationSetup& simulation) {
   std::string sync;
-  encoder.text("sync", sync);
+  encoder.get("sync", sync);
   double period_us = 1000.0;
-  encoder.number("sync_period_us", period_us, 1.0, {100.0, 1e6});
+  encoder.get("sync_period_us", period_us, kPlain, {100.0, 1e6});
   if (sync == "external") simulation.sync_period = seconds_to_ns(period_us * 1e-6);
 }
 
-void read_chain(TomlSection root, TruthMachine& truth) {
-  TomlSection machine = root.child("machine");
+void read_chain(Section root, TruthMachine& truth) {
+  Section machine = root.child("machine");
   std::string chain = "[w X b Y Z t]";
-  if (!machine.text("chain", chain)) root.fault("machine.chain", "missing");
+  machine.get("chain", chain, Need::Required);
   if (const auto order = parse_chain(chain)) {
     truth.order = *order;
   } else {
@@ -130,28 +126,29 @@ void read_chain(TomlSection root, TruthMachine& truth) {
 
 }  // namespace
 
-void read_machine_tables(TomlSection root, SetupDraft& draft) {
+void read_machine_tables(Section root, SetupDraft& draft) {
   SimulationSetup& simulation = draft.setup.simulation;
   read_chain(root, simulation.truth);
   read_axes(root, simulation.truth);
-  root.child("target").vector("offset_mm", simulation.truth.target_offset_m, kMilli);
-  TomlSection tracker = root.child("tracker");
-  tracker.number("sigma_range_um", simulation.tracker->model.sigma_range_m, kMicro,
-                 kNotNegativeNumber);
-  tracker.number("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro,
-                 kNotNegativeNumber);
-  tracker.port("port", simulation.tracker_port);
+  Section target = root.child("target");
+  get_vector(target, "offset_mm", simulation.truth.target_offset_m, kMilli);
+  Section tracker = root.child("tracker");
+  tracker.get("sigma_range_um", simulation.tracker->model.sigma_range_m, kMicro,
+              kNotNegativeNumber);
+  tracker.get("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro,
+              kNotNegativeNumber);
+  get_port(tracker, "port", simulation.tracker_port);
   read_nests(tracker, simulation);
-  TomlSection encoder = root.child("encoder");
-  encoder.port("peer_port", simulation.bus->port);
-  encoder.port("local_port", simulation.bus->peer_port);
-  encoder.text("interface", simulation.bus->interface);
+  Section encoder = root.child("encoder");
+  get_port(encoder, "peer_port", simulation.bus->port);
+  get_port(encoder, "local_port", simulation.bus->peer_port);
+  encoder.get_maybe_empty("interface", simulation.bus->interface);
   read_sync(encoder, simulation);
   read_encoder_nodes(root, encoder, simulation.nodes);
   read_counter_card(root.child("counter_card"), simulation);
   read_reference(root.child("reference"), simulation);
   read_cmm(root.child("cmm"), simulation);
-  root.child("daemon").number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
+  root.child("daemon").get("speed", draft.setup.speed, kPlain, {1e-3, 1e4});
 }
 
 }  // namespace abbe::sim

@@ -2,13 +2,13 @@
 /// The tables of abbe-sim evemu: how the ball array is touched, and the state of the array.
 
 #include "setup_file.hpp"
-#include "toml_section.hpp"
+#include "toml_file.hpp"
 
 namespace abbe::sim {
 
 /// [sim.evemu].
-void read_sim_evemu(TomlSection section, LoadedSetup& setup);
+void read_sim_evemu(Section section, LoadedSetup& setup);
 /// Reads [sim.ball_array]: how the true array differs from its calibrator.toml.
-void read_ball_array(TomlSection section, ArrayState& array);
+void read_ball_array(Section section, ArrayState& array);
 
 }  // namespace abbe::sim

@@ -6,78 +6,73 @@
 namespace abbe::sim {
 namespace {
 
-void read_device(TomlSection& section, SimulationSetup& simulation) {
+void read_device(Section& section, SimulationSetup& simulation) {
   TrackerOptions& tracker = *simulation.tracker;
   TrackerModel& model = tracker.model;
-  section.port("port", simulation.tracker_port);
-  section.vector("position_mm", model.position_m, kMilli);
-  section.vector("rotation_rad", model.rotation_rad);
-  section.number("sigma_range_um", model.sigma_range_m, kMicro, kNotNegativeNumber);
-  section.number("sigma_angle_urad", model.sigma_angle_rad, kMicro, kNotNegativeNumber);
-  section.number("max_radial_speed_mm_per_s", model.max_radial_speed_m_per_s, kMilli,
-                 kPositiveNumber);
-  section.number("max_lateral_speed_mm_per_s", model.max_lateral_speed_m_per_s, kMilli,
-                 kPositiveNumber);
-  section.number("clock_offset_s", model.clock_offset_s, 1.0, {0.0, 2e9});
-  section.number("clock_drift_ppm", model.clock_drift_ppm, 1.0, {-1000.0, 1000.0});
-  section.duration("delay_ms", tracker.delay, kMilli);
-  section.duration("warm_up_s", tracker.warm_up);
-  section.duration("command_latency_ms", tracker.command_latency, kMilli);
-  section.duration("initialize_s", tracker.initialize_time);
-  section.duration("fetch_beam_s", tracker.fetch_beam);
-  section.number("air_temperature_C", tracker.air_temperature_C);
-  section.number("air_pressure_mbar", tracker.air_pressure_mbar);
-  section.number("air_humidity_percent", tracker.air_humidity_percent);
-  section.number("air_drift_K_per_hour", tracker.air_drift_K_per_hour);
+  get_port(section, "port", simulation.tracker_port);
+  get_vector(section, "position_mm", model.position_m, kMilli);
+  get_vector(section, "rotation_rad", model.rotation_rad, kPlain);
+  section.get("sigma_range_um", model.sigma_range_m, kMicro, kNotNegativeNumber);
+  section.get("sigma_angle_urad", model.sigma_angle_rad, kMicro, kNotNegativeNumber);
+  section.get("max_radial_speed_mm_per_s", model.max_radial_speed_m_per_s, kMilli, kPositiveNumber);
+  section.get("max_lateral_speed_mm_per_s", model.max_lateral_speed_m_per_s, kMilli,
+              kPositiveNumber);
+  section.get("clock_offset_s", model.clock_offset_s, kPlain, {0.0, 2e9});
+  section.get("clock_drift_ppm", model.clock_drift_ppm, kPlain, {-1000.0, 1000.0});
+  section.get("delay_ms", tracker.delay, kMilli, kNotNegativeNumber);
+  section.get("warm_up_s", tracker.warm_up, kPlain, kNotNegativeNumber);
+  section.get("command_latency_ms", tracker.command_latency, kMilli, kNotNegativeNumber);
+  section.get("initialize_s", tracker.initialize_time, kPlain, kNotNegativeNumber);
+  section.get("fetch_beam_s", tracker.fetch_beam, kPlain, kNotNegativeNumber);
+  section.get("air_temperature_C", tracker.air_temperature_C, kPlain, kAnyNumber);
+  section.get("air_pressure_mbar", tracker.air_pressure_mbar, kPlain, kAnyNumber);
+  section.get("air_humidity_percent", tracker.air_humidity_percent, kPlain, kAnyNumber);
+  section.get("air_drift_K_per_hour", tracker.air_drift_K_per_hour, kPlain, kAnyNumber);
 }
 
-void read_drift(TomlSection& section, SetupDraft& draft) {
-  std::string course = "linear";
-  section.vector("drift_um", draft.drift_at_end_m, kMicro);
-  section.text("drift_course", course);
-  if (course != "linear" && course != "random-walk")
-    section.fault("drift_course", "must be \"linear\" or \"random-walk\"");
-  draft.drift_is_random_walk = course == "random-walk";
+void read_drift(Section& section, SetupDraft& draft) {
+  get_vector(section, "drift_um", draft.drift_at_end_m, kMicro);
+  section.get_word<bool>("drift_course", draft.drift_is_random_walk,
+                         {{"linear", false}, {"random-walk", true}});
 }
 
-ReferenceNest read_nest(TomlSection& section) {
+ReferenceNest read_nest(Section& section) {
   ReferenceNest nest;
-  if (!section.vector("position_mm", nest.position_m, kMilli))
-    section.fault("position_mm", "missing");
-  section.vector("moved_um", nest.moved_m, kMicro);
-  section.number("moved_at_s", nest.moved_at_s, 1.0, kNotNegativeNumber);
-  section.refuse_unknown_keys();
+  get_vector(section, "position_mm", nest.position_m, kMilli, Need::Required);
+  get_vector(section, "moved_um", nest.moved_m, kMicro);
+  section.get("moved_at_s", nest.moved_at_s, kPlain, kNotNegativeNumber);
+  section.close(Hint::AllKeys);
   return nest;
 }
 
-void read_visits(TomlSection& section, SetupDraft& draft) {
+void read_visits(Section& section, SetupDraft& draft) {
   NestVisits& visits = draft.setup.simulation.tracker->model.nests;
-  section.flag("nest_visits", draft.nest_visits);
-  section.number("nest_every_s", draft.setup.simulation.path.wait_every_s, 1.0, kNotNegativeNumber);
-  section.number("nest_stay_s", visits.stay_s, 1.0, kPositiveNumber);
-  section.number("nest_move_s", visits.move_s, 1.0, kNotNegativeNumber);
-  section.number("nest_repeatability_um", visits.repeatability_m, kMicro, kNotNegativeNumber);
+  section.get("nest_visits", draft.nest_visits);
+  section.get("nest_every_s", draft.setup.simulation.path.wait_every_s, kPlain, kNotNegativeNumber);
+  section.get("nest_stay_s", visits.stay_s, kPlain, kPositiveNumber);
+  section.get("nest_move_s", visits.move_s, kPlain, kNotNegativeNumber);
+  section.get("nest_repeatability_um", visits.repeatability_m, kMicro, kNotNegativeNumber);
 
   std::vector<ReferenceNest> nests;
-  for (TomlSection& nest : section.children("nest")) nests.push_back(read_nest(nest));
+  for (Section& nest : section.children("nest")) nests.push_back(read_nest(nest));
   if (!nests.empty()) visits.nests = nests;
 }
 
 }  // namespace
 
-void read_sim_tracker(TomlSection section, SetupDraft& draft) {
+void read_sim_tracker(Section section, SetupDraft& draft) {
   read_device(section, draft.setup.simulation);
   read_drift(section, draft);
   read_visits(section, draft);
-  section.refuse_unknown_keys();
+  section.close(Hint::AllKeys);
 }
 
-void read_nests(TomlSection& tracker, SimulationSetup& simulation) {
+void read_nests(Section& tracker, SimulationSetup& simulation) {
   NestVisits& visits = simulation.tracker->model.nests;
-  tracker.number("nest_repeatability_um", visits.repeatability_m, kMicro, kNotNegativeNumber);
-  for (TomlSection& section : tracker.children("nest")) {
+  tracker.get("nest_repeatability_um", visits.repeatability_m, kMicro, kNotNegativeNumber);
+  for (Section& section : tracker.children("nest")) {
     ReferenceNest nest;
-    if (section.vector("position_mm", nest.position_m, kMilli)) visits.nests.push_back(nest);
+    if (get_vector(section, "position_mm", nest.position_m, kMilli)) visits.nests.push_back(nest);
   }
 }
 

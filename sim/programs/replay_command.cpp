@@ -6,15 +6,13 @@
 #include <charconv>
 #include <memory>
 
-#include <toml++/toml.h>
-
 #include "abbe/result/try.hpp"
+#include "abbe/sections/bounded_toml.hpp"
 #include "abbe/sim/replay.hpp"
 #include "commands.hpp"
 #include "event_loop.hpp"
 #include "files.hpp"
 #include "ports_file.hpp"
-#include "toml_section.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -50,7 +48,7 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
 
 /// Reads from the recorded configuration the serial numbers that the daemon expected of its cards.
 void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
-  const auto root = parse_toml(configuration, "recorded configuration");
+  const auto root = sections::parse_bounded(configuration, "recorded configuration");
   // The configuration may be of a daemon version that abbe-sim cannot read: the bytes are replayed
   // nevertheless.
   if (!root) return;

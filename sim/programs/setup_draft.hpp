@@ -10,8 +10,6 @@
 
 namespace abbe::sim {
 
-inline constexpr double kMmPerMin = 1e-3 / 60.0;  ///< in m/s
-
 struct SetupDraft {
   LoadedSetup setup;
   RandomTruthOptions random;

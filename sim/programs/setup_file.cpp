@@ -7,7 +7,7 @@
 #include "read_measuring_machine.hpp"
 #include "read_sim.hpp"
 #include "setup_draft.hpp"
-#include "toml_section.hpp"
+#include "toml_file.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -28,9 +28,9 @@ Result<void> read_files(const SetupChoices& choices, SetupDraft& draft) {
   // The machine file is read first, although [sim] may name it: the ports and the speed in [sim]
   // override those in the machine file.
   if (!choices.config_file.empty()) {
-    auto named = read_toml_file(choices.config_file, [&](TomlSection root) {
+    auto named = read_toml_file(choices.config_file, [&](Section root) {
       std::string machine;
-      if (root.child("sim").text("machine", machine))
+      if (root.child("sim").get("machine", machine))
         draft.machine_file = beside_file(choices.config_file, machine);
     });
     if (!named) return named;
@@ -41,13 +41,13 @@ Result<void> read_files(const SetupChoices& choices, SetupDraft& draft) {
   if (draft.machine_file.empty())
     return usage_error("no machine: give --machine FILE or --config FILE");
   const std::string machine_file = draft.machine_file;
-  auto machine = read_toml_file(
-      machine_file, [&](TomlSection root) { read_machine_tables(std::move(root), draft); });
+  auto machine = read_toml_file(machine_file,
+                                [&](Section root) { read_machine_tables(std::move(root), draft); });
   if (!machine) return machine;
   if (choices.config_file.empty()) return {};
 
-  return read_toml_file(choices.config_file, [&](TomlSection root) {
-    TomlSection sim = root.child("sim");
+  return read_toml_file(choices.config_file, [&](Section root) {
+    Section sim = root.child("sim");
     if (!sim.present()) return root.fault("sim", "missing");
     read_sim(sim, choices.config_file, draft);
   });
@@ -60,7 +60,8 @@ void apply_choices(const SetupChoices& choices, SetupDraft& draft) {
   if (choices.seed) draft.seed = static_cast<std::int64_t>(*choices.seed);
   if (choices.speed) draft.setup.speed = *choices.speed;
   if (choices.dwell_s) simulation.path.dwell_s = *choices.dwell_s;
-  if (choices.feed_mm_per_min) simulation.path.feed_m_per_s = *choices.feed_mm_per_min * kMmPerMin;
+  if (choices.feed_mm_per_min)
+    simulation.path.feed_m_per_s = *choices.feed_mm_per_min / kPerMinute.per_si;
   if (choices.tracker_port) simulation.tracker_port = *choices.tracker_port;
   if (choices.can_port) simulation.bus->port = *choices.can_port;
   if (!choices.can_interface.empty()) simulation.bus->interface = choices.can_interface;

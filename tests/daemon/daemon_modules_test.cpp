@@ -21,7 +21,7 @@ using testing::SizeIs;
 using Names = std::set<std::string>;
 
 const fs::path kDaemon = ABBE_DAEMON_FOLDER;
-const Names kOuter{"protocol", "drivers", "calib", "sim"};
+const Names kOuter{"protocol", "sections", "drivers", "calib", "sim"};
 const Names kFastDds{"fastrtps", "dds_topics", "dds_endpoints"};
 
 struct ModuleRow {

@@ -61,7 +61,8 @@ class SimExample : public testing::Test {
         table == "sim.environment" || table == "sim.fault" || table == "sim.tracker.nest";
     const std::string output =
         faults((array ? "[[" + table + "]]" : "[" + table + "]") + "\nxxxxxxxxxxxx = 1\n");
-    const std::regex list{table + "\\.xxxxxxxxxxxx: unknown key; the keys of this table are (.*)"};
+    const std::regex list{table + (array ? "\\[0\\]" : "") +
+                          "\\.xxxxxxxxxxxx: unknown key; the keys of this table are (.*)"};
     std::smatch found;
     std::set<std::string> keys;
     if (!std::regex_search(output, found, list)) return keys;

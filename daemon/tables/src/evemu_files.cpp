@@ -60,14 +60,8 @@ void read_blocks(Section& root, calib::evemu::Calibrator& out,
                  std::array<std::optional<BlockFace>, 2>& faces) {
   for (Section& block : root.children("block")) {
     calib::evemu::Calibrator::Block b;
-    std::vector<double> normal;
     block.get_integer("number", b.number, 1, 2, Need::Required);
-    if (block.get("normal", normal, kPlain, Need::Required)) {
-      if (normal.size() == 3)
-        b.normal = {normal[0], normal[1], normal[2]};
-      else
-        block.fault("normal", "must be three numbers, x, y, z");
-    }
+    get_vector(block, "normal", b.normal, kPlain, Need::Required);
     block.get("u_urad", b.u_rad, kMicro, kNotNegative);
     read_face(block, faces[b.number == 2 ? 1 : 0]);
     block.close();

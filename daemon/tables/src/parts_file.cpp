@@ -20,12 +20,8 @@ void read_file_name(Section& part, std::string_view key, std::string& out,
 }
 
 void read_vector(Section& part, std::string_view key, std::optional<calib::Vector3>& out) {
-  std::vector<double> given;
-  if (!part.get(key, given, kMilli)) return;
-  if (given.size() == 3)
-    out = calib::Vector3(given[0], given[1], given[2]);
-  else
-    part.fault(key, "must be three numbers, x, y, z");
+  calib::Vector3 given;
+  if (get_vector(part, key, given, kMilli)) out = given;
 }
 
 RunFiles read_run(Section& part, std::size_t number, const std::filesystem::path& folder) {

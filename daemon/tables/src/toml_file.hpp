@@ -3,15 +3,12 @@
 
 #include <toml++/toml.h>
 #include <filesystem>
-#include <optional>
 #include <string_view>
-#include <vector>
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
-#include "abbe/calib/geometry/rigid_transform.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "abbe/settings/section.hpp"
@@ -38,19 +35,6 @@ struct TomlFile {
   const auto text = read_text(file);
   ABBE_TRY(text);
   return parse_toml_text(*text, file, bounds);
-}
-
-/// Reads three numbers.
-inline bool get_vector(Section& section, std::string_view key, calib::Vector3& out, Unit unit,
-                       Need need = Need::Optional) {
-  std::vector<double> given;
-  if (!section.get(key, given, unit, need)) return false;
-  if (given.size() == 3) {
-    out = {given[0], given[1], given[2]};
-    return true;
-  }
-  section.fault(key, "must be three numbers, x, y, z");
-  return false;
 }
 
 }  // namespace abbe::daemon

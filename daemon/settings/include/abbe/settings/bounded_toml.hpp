@@ -1,7 +1,5 @@
 #pragma once
-/// TOML with limits on size and nesting depth, checked before the text is parsed: parsed tables are
-/// copied and destroyed recursively, so deep nesting could exhaust the stack. Each part of a dotted
-/// key (a.b.c) adds one level.
+/// TOML with the limits of sections, with errors of the daemon.
 
 #include <toml++/toml.h>
 #include <cstddef>
@@ -10,14 +8,13 @@
 #include <string_view>
 
 #include "abbe/base/error.hpp"
-#include "abbe/protocol/toml_nesting.hpp"
+#include "abbe/sections/bounded_toml.hpp"
 
 namespace abbe::daemon {
 
-using protocol::TomlBounds;
+using sections::TomlBounds;
 
-/// The parsed table, or BadInput with one fault, "FILE:LINE:COLUMN: ...". Only the first syntax
-/// error is reported, because the faults after it would not be reliable.
+/// The parsed table, or BadInput with one fault, "FILE:LINE:COLUMN: ...".
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file,
                                              const TomlBounds& bounds = {});
 

@@ -1,13 +1,15 @@
-#include "abbe/settings/section.hpp"
-#include "abbe/protocol/printable.hpp"
+#include "abbe/sections/section.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
-namespace abbe::daemon {
+#include "abbe/protocol/printable.hpp"
+
+namespace abbe::sections {
 
 namespace {
 
@@ -264,20 +266,23 @@ bool Section::take_word(std::string_view key, std::size_t& out,
   if (found == words.end()) {
     fault_at(node->source().begin, key,
              fmt::format("must be one of \"{}\"{}", fmt::join(words, "\", \""),
-                         value ? suggestion(*value, words) : ""));
+                         value ? protocol::suggestion(*value, words) : ""));
     return false;
   }
   out = static_cast<std::size_t>(found - words.begin());
   return true;
 }
 
-void Section::close() {
+void Section::close(Hint hint) {
   if (table_ == nullptr) return;
-  const std::vector<std::string_view> known(known_.begin(), known_.end());
-  for (const auto& [key, node] : *table_)
-    if (std::find(known.begin(), known.end(), key.str()) == known.end())
-      fault_at(key.source().begin, key.str(),
-               fmt::format("unknown key{}", suggestion(key.str(), known)));
+  const std::set<std::string_view> known(known_.begin(), known_.end());
+  for (const auto& [key, node] : *table_) {
+    if (known.contains(key.str())) continue;
+    std::string more = protocol::suggestion(key.str(), {known_.begin(), known_.end()});
+    if (more.empty() && hint == Hint::AllKeys)
+      more = fmt::format("; the keys of this table are {}", fmt::join(known, ", "));
+    fault_at(key.source().begin, key.str(), "unknown key" + more);
+  }
 }
 
-}  // namespace abbe::daemon
+}  // namespace abbe::sections

@@ -1,9 +1,9 @@
-#include "abbe/protocol/toml_nesting.hpp"
+#include "toml_nesting.hpp"
 
 #include <algorithm>
 #include <vector>
 
-namespace abbe::protocol {
+namespace abbe::sections {
 namespace {
 
 /// Tracks the nesting depth of a TOML text. The decimal point of a number is counted like a dot of
@@ -118,4 +118,4 @@ std::optional<std::size_t> toml_deeper_than(std::string_view text, std::size_t m
   return TomlNesting{text}.exceeds(most);
 }
 
-}  // namespace abbe::protocol
+}  // namespace abbe::sections

@@ -14,13 +14,13 @@
 #include <string_view>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/limited_log.hpp"
 #include "abbe/base/message.hpp"
 #include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
 #include "abbe/base/standard_error.hpp"
 #include "abbe/config/mtconnect_config.hpp"
 #include "abbe/mtconnect/daemon_poll.hpp"
-#include "abbe/mtconnect/limited_log.hpp"
 #include "abbe/mtconnect/shdr_feed.hpp"
 #include "abbe/mtconnect/shdr_server.hpp"
 
@@ -123,14 +123,14 @@ void serve(ShdrServer& server, Adapter& adapter, DaemonPoll& poll) {
 
 int run(const MtconnectSettings& settings) {
   Adapter adapter;
-  abbe::mtconnect::LimitedLog clients(log_line);
+  abbe::daemon::LimitedLog clients(log_line, {.lines = 20, .period = std::chrono::minutes{1}});
   const auto& wanted = settings.mtconnect;
   auto server = ShdrServer::listen(
       {.address = wanted.address,
        .port = wanted.port,
        .heartbeat = std::chrono::duration_cast<std::chrono::milliseconds>(wanted.heartbeat)},
       [&adapter] { return adapter.greeting(); },
-      [&clients](std::string_view line) { clients.line(line); });
+      [&clients](std::string_view line) { clients.line("clients", std::string(line)); });
   if (!server) return refuse(server.error());
   stop_on_signals();
 

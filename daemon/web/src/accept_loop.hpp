@@ -21,7 +21,7 @@ class AcceptLoop {
   using Report = std::function<void(const std::string& subject, const std::string& line)>;
 
   /// `listener`: a listening socket, which must exist as long as the loop; it becomes non-blocking.
-  /// `take` receives each connection, and must not wait. `report`: as of LimitedReport. Throws
+  /// `take` receives each connection, and must not wait. `report`: as of LimitedLog. Throws
   /// std::system_error if the thread cannot be created.
   AcceptLoop(int listener, Take take, Report report);
   AcceptLoop(const AcceptLoop&) = delete;

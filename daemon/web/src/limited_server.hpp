@@ -33,7 +33,7 @@ class LimitedServer final : public httplib::Server {
 
   /// What the server calls, from any thread.
   struct Calls {
-    /// A subject, as in LimitedReport, and a line.
+    /// A subject, as in LimitedLog, and a line.
     std::function<void(const std::string&, const std::string&)> report;
     /// False if a client (client_network()) sends too many requests.
     std::function<bool(const std::string& network)> admits;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "abbe/base/limited_log.hpp"
 #include "abbe/web/certificate.hpp"
 #include "abbe/web/daemon_feed.hpp"
 #include "abbe/web/event_board.hpp"
@@ -16,7 +17,6 @@
 #include "abbe/web/replays.hpp"
 #include "abbe/web/sessions.hpp"
 #include "http.hpp"
-#include "limited_report.hpp"
 #include "request_rate.hpp"
 
 namespace abbe::web {
@@ -24,7 +24,7 @@ namespace abbe::web {
 struct PageContext {
   explicit PageContext(PageOptions given)
       : options(std::move(given)),
-        report(options.report),
+        report(options.report, {.lines = 1, .period = std::chrono::seconds{10}}),
         models(options.settings.config.daemon.models_dir(),
                daemon::machine_hash(options.settings.config)),
         sessions(options.settings.web.users,
@@ -53,7 +53,7 @@ struct PageContext {
   }
 
   PageOptions options;
-  LimitedReport report;
+  daemon::LimitedLog report;
   RequestRate rate{kRequestsPerSecond, kRequestsAtOnce};
   EventBoard board;
   ModelViews models;

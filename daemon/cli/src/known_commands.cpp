@@ -5,27 +5,11 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <numeric>
+
+#include "abbe/base/faults.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-/// Insertions, deletions and replacements of one character that make `b` from `a` [Levenshtein].
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
 
 std::vector<std::string> names_of(const CLI::App& app) {
   std::vector<std::string> names;
@@ -37,7 +21,8 @@ std::vector<std::string> names_of(const CLI::App& app) {
 /// The name most similar to `word`. nullopt if none differs by at most a third of its characters,
 /// or by two characters for a short word (two exchanged characters count as two): a less similar
 /// name is probably not the one that was meant.
-std::optional<std::string> nearest(const std::string& word, const std::vector<std::string>& names) {
+std::optional<std::string> nearest_name(const std::string& word,
+                                        const std::vector<std::string>& names) {
   const auto distance = [&](const std::string& name) { return edit_distance(word, name); };
   const auto best = std::min_element(names.begin(), names.end(), [&](const auto& a, const auto& b) {
     return distance(a) < distance(b);
@@ -52,7 +37,7 @@ std::optional<std::string> nearest(const std::string& word, const std::vector<st
 Error unknown_word(const std::string& word, const std::string& before,
                    const std::vector<std::string>& names) {
   Error error{ErrorCode::Usage, fmt::format("\"{}{}\" is not a command", before, word)};
-  if (const auto name = nearest(word, names)) {
+  if (const auto name = nearest_name(word, names)) {
     error.text += fmt::format("; the nearest one is `abbe {}{}`", before, *name);
   } else {
     error.text += fmt::format("; known: {}", fmt::join(names, ", "));

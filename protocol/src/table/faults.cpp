@@ -106,8 +106,6 @@ std::string Faults::heading() const {
   return file_ + ": " + std::to_string(different) + (different == 1 ? " fault" : " faults");
 }
 
-namespace {
-
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -122,6 +120,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   }
   return row[b.size()];
 }
+
+namespace {
 
 /// True if only the unit differs, such as "min" or "min_m" for "min_mm".
 bool differs_in_unit(std::string_view word, std::string_view known) {

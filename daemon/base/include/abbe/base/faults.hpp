@@ -6,6 +6,7 @@
 
 namespace abbe::daemon {
 
+using protocol::edit_distance;
 using protocol::nearest;
 using protocol::suggestion;
 

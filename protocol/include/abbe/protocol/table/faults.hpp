@@ -60,6 +60,9 @@ class Faults {
   std::size_t repeated_ = 0;  // calls of add() with a fault that was already there
 };
 
+/// Insertions, deletions and replacements of one character that make `b` from `a` [Levenshtein].
+[[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
+
 /// The entry of `known` that is most similar to the misspelt `word`: it differs by a few letters or
 /// only in the unit suffix. Empty if no entry is similar.
 [[nodiscard]] std::string_view nearest(std::string_view word,

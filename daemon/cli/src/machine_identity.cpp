@@ -18,6 +18,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/result/try.hpp"
 #include "commands.hpp"
@@ -76,11 +77,9 @@ int show_identity(const IdentityArguments& arguments) {
 int decide(const IdentityArguments& arguments, IdentityAction action) {
   const auto folder = data_dir_of(arguments);
   if (!folder) return report(folder.error());
-  const auto now =
-      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  const auto decided =
-      decide_identity(*folder, marks_of_this_computer(),
-                      {.action = action, .who = user_name(), .why = arguments.reason, .when = now});
+  const auto decided = decide_identity(
+      *folder, marks_of_this_computer(),
+      {.action = action, .who = user_name(), .why = arguments.reason, .when = utc_now()});
   if (!decided) return report(decided.error());
   print_identity(*decided, {});
   if (action == IdentityAction::Renewed)

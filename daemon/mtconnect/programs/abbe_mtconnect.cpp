@@ -19,6 +19,7 @@
 #include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
 #include "abbe/base/standard_error.hpp"
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/config/mtconnect_config.hpp"
 #include "abbe/mtconnect/daemon_poll.hpp"
 #include "abbe/mtconnect/shdr_feed.hpp"
@@ -31,6 +32,7 @@ using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 using abbe::daemon::ExitCode;
 using abbe::daemon::MtconnectSettings;
+using abbe::daemon::utc_now;
 using abbe::mtconnect::DaemonPoll;
 using abbe::mtconnect::ShdrFeed;
 using abbe::mtconnect::ShdrServer;
@@ -66,10 +68,6 @@ void stop_on_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
-}
-
-abbe::protocol::UtcTime utc_now() {
-  return abbe::protocol::UtcTime{std::chrono::system_clock::now().time_since_epoch()};
 }
 
 /// The state of abbed, for its agents and for the log.

@@ -230,10 +230,8 @@ struct Abbed::State {
 
   /// Nothing is refused: acquisition and recording do not need the identity.
   Result<void> open_machine_identity() {
-    const auto now = std::chrono::system_clock::now();
     machine_identity.emplace(
-        IdentityWatch::open(config.daemon.data_dir, marks_of_this_computer(),
-                            std::chrono::time_point_cast<std::chrono::nanoseconds>(now)));
+        IdentityWatch::open(config.daemon.data_dir, marks_of_this_computer(), utc_now()));
     authority->set_identity(&*machine_identity);
     const auto& known = machine_identity->known();
     if (!known.machine_id.empty())
@@ -406,9 +404,7 @@ struct Abbed::State {
   }
 
   [[nodiscard]] SensorStateClock sensor_clock() const {
-    return {.host = time.now(),
-            .utc = std::chrono::system_clock::now().time_since_epoch(),
-            .speed = config.daemon.speed};
+    return {.host = time.now(), .utc = utc_now().time_since_epoch(), .speed = config.daemon.speed};
   }
 
   /// The state of the sensors in the earlier run; nullopt: they start without one.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "outcome.hpp"
@@ -13,8 +14,7 @@ namespace {
 constexpr std::chrono::seconds kLockPatience{5};
 
 StoreActor store_actor(std::string who, std::string why) {
-  return {std::move(who), std::move(why),
-          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
+  return {std::move(who), std::move(why), utc_now()};
 }
 
 }  // namespace

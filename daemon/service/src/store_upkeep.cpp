@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdio>
 
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "outcome.hpp"
@@ -24,7 +25,7 @@ Result<std::vector<std::string>> keep_up(const std::filesystem::path& folder,
       "abbed",
       fmt::format("[models] keep_newest = {}, keep_days = {}", retention.keep_newest,
                   std::chrono::duration_cast<std::chrono::days>(retention.keep).count()),
-      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
+      utc_now()};
   auto removed = store.remove_old(retention, actor);
   if (!removed) return removed;
   ABBE_TRY(store.list());

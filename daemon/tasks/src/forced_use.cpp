@@ -4,8 +4,9 @@
 #include <pwd.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <utility>
+
+#include "abbe/base/wall_clock.hpp"
 
 namespace abbe::daemon {
 
@@ -22,8 +23,7 @@ std::string user_name() {
 }
 
 StoreActor actor_now(std::string why) {
-  return {user_name(), std::move(why),
-          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
+  return {user_name(), std::move(why), utc_now()};
 }
 
 }  // namespace abbe::daemon

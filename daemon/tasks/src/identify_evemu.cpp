@@ -8,6 +8,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/evemu/document.hpp"
 #include "abbe/result/try.hpp"
@@ -98,9 +99,7 @@ Result<EvemuOutcome> identify_evemu(const IdentifyEvemuArguments& arguments,
     verdict.notes.push_back(fmt::format(
         "the temperature of the array is not known: {}; give it with --artefact-C", missing));
 
-  const auto now =
-      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  auto document = evemu_document(*candidate, input->config, std::move(input->sources), now);
+  auto document = evemu_document(*candidate, input->config, std::move(input->sources), utc_now());
   document.recording_gap = std::move(input->recording_gap);
   add_measured(document, input->observed, input->utc);
   return EvemuOutcome{*std::move(candidate), std::move(document)};

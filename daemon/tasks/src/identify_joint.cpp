@@ -1,8 +1,8 @@
 #include "abbe/tasks/identify_joint.hpp"
 
-#include <chrono>
 #include <utility>
 
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/run_figures.hpp"
@@ -40,7 +40,7 @@ ModelDocument joint_document(const JointInput& input, const joint::JointModel& m
           "joint",
           input.config.machine.name,
           machine_hash(input.config),
-          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()),
+          utc_now(),
           joint_statistics(input, model, verdict.held_out),
           input.sources};
 }

@@ -9,6 +9,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/calib/mfb/run/touches_off.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/mfb/document.hpp"
@@ -181,10 +182,8 @@ Result<MfbOutcome> identify_mfb(const IdentifyMfbArguments& arguments, const Pro
   auto candidate = identified(arguments, *input, progress);
   ABBE_TRY(candidate);
 
-  const auto now =
-      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
   auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
-                               input->sources, now);
+                               input->sources, utc_now());
   add_measured(document, input->observed, input->utc);
   return MfbOutcome{*std::move(candidate), std::move(document)};
 }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <numbers>
 #include <optional>
@@ -11,6 +10,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/calib/otf/solve/other_beams.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/document.hpp"
@@ -28,14 +28,6 @@
 namespace abbe::daemon {
 
 namespace otf = calib::otf;
-
-namespace {
-
-protocol::UtcTime now() {
-  return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-}
-
-}  // namespace
 
 std::string_view words(otf::Stage stage) {
   switch (stage) {
@@ -90,7 +82,7 @@ Result<void> apply_frame(const TrackerFile& points, const std::string& file,
 
 OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
                       std::vector<InputFile> sources) {
-  auto document = otf_document(candidate, config, std::move(sources), now());
+  auto document = otf_document(candidate, config, std::move(sources), utc_now());
   const auto& s = candidate.solution.statistics;
   return {std::move(document),
           std::move(candidate.verdict),

@@ -3,6 +3,7 @@
 /// it is needed, never computed from the clock at the start of the process, because the wall clock
 /// may be set in between. Copies have the same start. Thread-safe.
 
+#include <chrono>
 #include <functional>
 #include <utility>
 
@@ -10,6 +11,11 @@
 #include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {
+
+/// The present time, for code that has no WallClock.
+[[nodiscard]] inline protocol::UtcTime utc_now() {
+  return protocol::UtcTime{std::chrono::system_clock::now().time_since_epoch()};
+}
 
 class WallClock {
  public:

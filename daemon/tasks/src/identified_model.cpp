@@ -52,7 +52,7 @@ Result<ReportSubject> kept(const ResultPlace& place, const ModelDocument& docume
   return report_subject(*store, *id);
 }
 
-Result<void> write_report(const std::filesystem::path& folder, const ReportSubject& subject) {
+Result<void> write_page(const std::filesystem::path& folder, const ReportSubject& subject) {
   const auto page = model_report(subject);
   ABBE_TRY(page);
   return replace_file(folder / "report.html", *page);
@@ -78,11 +78,11 @@ Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& ident
   for (const auto& [name, text] : more) ABBE_TRY(replace_file(folder / name, text));
 
   // Before the store: a model that cannot be reported is not kept, and the error says so.
-  ABBE_TRY(write_report(folder, judged(document, verdict)));
+  ABBE_TRY(write_page(folder, judged(document, verdict)));
   if (place.keep.empty()) return {};
   const auto subject = kept(place, document, verdict);
   ABBE_TRY(subject);
-  return write_report(folder, *subject);
+  return write_page(folder, *subject);
 }
 
 nlohmann::json verdict_json(const calib::Verdict& verdict) {

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -11,7 +10,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model/model_drift.hpp"
-#include "abbe/config/calib_error.hpp"
+#include "abbe/tasks/model_drift.hpp"
 #include "commands.hpp"
 #include "same_machine.hpp"
 #include "store_option.hpp"
@@ -20,11 +19,8 @@
 namespace abbe::daemon {
 namespace {
 
-struct ModelDriftArguments {
-  std::string a, b;
-  StoreOption store;
-  double false_alarm = calib::DriftOptions{}.false_alarm;
-  bool other_machine = false, json = false;
+struct ModelDriftCommand : ModelDriftArguments {
+  bool json = false;
 };
 
 constexpr double kMicroPerSi = 1e6;
@@ -80,35 +76,26 @@ void print(const calib::DriftTest& drift) {
   }
 }
 
-int run_model_drift(const ModelDriftArguments& arguments) {
-  const auto a = found_model(arguments.a, arguments.store);
-  if (!a) return report(a.error());
-  const auto b = found_model(arguments.b, arguments.store);
-  if (!b) return report(b.error());
-  const std::array machines{of_machine(arguments.a, *a), of_machine(arguments.b, *b)};
-  const auto different = require_same_machine("model drift", machines, arguments.other_machine);
-  if (!different) return report(different.error());
-
-  const auto drift = calib::test_drift(b->document.model, a->document.model,
-                                       {.false_alarm = arguments.false_alarm});
-  if (!drift) return report(error_of(drift.error()));
+int run_model_drift(const ModelDriftCommand& arguments) {
+  const auto found = model_drift(arguments);
+  if (!found) return report(found.error());
 
   if (arguments.json) {
-    auto object = drift_json(*drift);
-    object["machine_a"] = machines[0].machine;
-    object["machine_b"] = machines[1].machine;
+    auto object = drift_json(found->test);
+    object["machine_a"] = found->machine_a;
+    object["machine_b"] = found->machine_b;
     fmt::print("{}\n", indented_json_text(object));
   } else {
-    if (!different->empty()) fmt::print("{}\n", *different);
-    print(*drift);
+    if (!found->different_machines.empty()) fmt::print("{}\n", found->different_machines);
+    print(found->test);
   }
-  return drift->drifted ? exit_code(ErrorCode::Refused) : 0;
+  return found->test.drifted ? exit_code(ErrorCode::Refused) : 0;
 }
 
 }  // namespace
 
 void add_model_drift(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<ModelDriftArguments>();
+  auto arguments = std::make_shared<ModelDriftCommand>();
   auto* command = parent.add_subcommand(
       "drift",
       "Test every table of model B against model A, with the uncertainty of both: has the machine\n"

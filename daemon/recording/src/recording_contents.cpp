@@ -78,7 +78,7 @@ std::optional<mcap::Bytes> indexed(ByteWindow& file, Opcode opcode, std::uint64_
 }
 
 void collect_by_indexes(ByteWindow& file, const mcap::Summary& summary,
-                        ContentsCollector& collector) {
+                        const std::function<bool()>& stopped, ContentsCollector& collector) {
   for (const auto& channel : summary.channels) collector.add(channel);
   for (const auto& index : summary.metadata) {
     if (const auto content = indexed(file, Opcode::Metadata, index.offset, index.length))
@@ -97,6 +97,7 @@ void collect_by_indexes(ByteWindow& file, const mcap::Summary& summary,
   }
 
   for (const auto& index : summary.chunks) {
+    if (stopped && stopped()) return;
     const auto record = record_in(file, index.chunk_start);
     if (record && record->opcode == Opcode::Chunk)
       add_whole_chunk(file, *record, collector);
@@ -196,12 +197,13 @@ bool is_truncated_end(ByteWindow& file, std::uint64_t offset) {
 }
 
 /// Offset of the end of the whole records. Sets closed_cleanly if DataEnd follows.
-std::uint64_t collect_records(ByteWindow& file, ContentsCollector& collector) {
+std::uint64_t collect_records(ByteWindow& file, const std::function<bool()>& stopped,
+                              ContentsCollector& collector) {
   LooseRecords loose(file, collector);
   std::uint64_t at = mcap::kMagic.size();
   while (at < file.file_size()) {
     const auto record = record_in(file, at);
-    if (!record) break;
+    if (!record || (stopped && stopped())) break;
     at = record->end();
     collector.contents.closed_cleanly = record->opcode == Opcode::DataEnd;
     if (collector.contents.closed_cleanly) break;
@@ -213,14 +215,14 @@ std::uint64_t collect_records(ByteWindow& file, ContentsCollector& collector) {
 
 /// `why`: why the file has no usable indexes; nullopt if it does not need them.
 void collect_by_scan(ByteWindow& file, std::optional<mcap::SummaryError> why,
-                     ContentsCollector& collector) {
+                     const std::function<bool()>& stopped, ContentsCollector& collector) {
   // The recording ends with the magic, so it was closed: if the records do not continue to this
   // end, they are damaged, not truncated.
   const auto size = file.file_size();
   const auto last = file.at(size - std::min<std::uint64_t>(size, mcap::kMagic.size()), size);
   collector.cut_is_damage = last && mcap::ends_with_magic(*last);
 
-  const std::uint64_t end = collect_records(file, collector);
+  const std::uint64_t end = collect_records(file, stopped, collector);
   const bool absent = !why || *why == mcap::SummaryError::NoSummary;
   if (collector.contents.closed_cleanly && !absent) {
     collector.lost(
@@ -254,7 +256,7 @@ tl::expected<mcap::Summary, mcap::SummaryError> summary_of(const RecordedBytes& 
 
 }  // namespace
 
-Contents contents_of(const RecordedBytes& file) {
+Contents contents_of(const RecordedBytes& file, const std::function<bool()>& stopped) {
   std::vector<std::byte> summary_bytes;
   const auto summary = summary_of(file, summary_bytes);
   std::optional<std::uint64_t> counted;
@@ -264,7 +266,7 @@ Contents contents_of(const RecordedBytes& file) {
   if (summary && indexes_are_complete(*summary)) {
     ContentsCollector collector;
     collector.contents.closed_cleanly = true;
-    collect_by_indexes(window, *summary, collector);
+    collect_by_indexes(window, *summary, stopped, collector);
     // Messages outside of chunks have no index.
     if (!collector.contents.losses.empty() || collector.contents.messages == counted)
       return collector.finish(counted);
@@ -273,7 +275,8 @@ Contents contents_of(const RecordedBytes& file) {
   ContentsCollector collector;
   if (summary)
     for (const auto& channel : summary->channels) collector.add(channel);
-  collect_by_scan(window, summary ? std::nullopt : std::optional(summary.error()), collector);
+  collect_by_scan(window, summary ? std::nullopt : std::optional(summary.error()), stopped,
+                  collector);
   return collector.finish(counted);
 }
 

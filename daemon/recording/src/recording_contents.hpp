@@ -2,6 +2,7 @@
 /// The contents of a recording, complete or damaged: found by its indexes, or without complete
 /// indexes, which MCAP does not require, by reading all records from the front.
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -36,7 +37,9 @@ struct Contents {
 };
 
 /// Accepts any bytes after the MCAP magic. Precondition: the bytes start with the magic. Bytes that
-/// cannot be read are missing in the contents; `file.intact()` is then an Error.
-[[nodiscard]] Contents contents_of(const RecordedBytes& file);
+/// cannot be read are missing in the contents; `file.intact()` is then an Error. Once `stopped`,
+/// which may be empty, returns true, the rest of the file is not read: the contents are not to be
+/// used.
+[[nodiscard]] Contents contents_of(const RecordedBytes& file, const std::function<bool()>& stopped);
 
 }  // namespace abbe::daemon::recording

@@ -144,7 +144,8 @@ bool begins_with_magic(const recording::RecordedBytes& file) {
 
 }  // namespace
 
-Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path) {
+Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path,
+                                              const std::function<bool()>& stopped) {
   auto file = recording::RecordedBytes::open(path);
   ABBE_TRY(file);
   if (!begins_with_magic(**file)) {
@@ -153,7 +154,10 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
                             path.string()));
   }
 
-  Contents contents = recording::contents_of(**file);
+  Contents contents = recording::contents_of(**file, stopped);
+  if (stopped && stopped())
+    return fail(ErrorCode::DataInsufficient,
+                fmt::format("read {}: stopped before its end", path.string()));
   ABBE_TRY((*file)->intact());
   if (contents.messages == 0 && !contents.compression.empty())
     return fail(ErrorCode::BadInput,

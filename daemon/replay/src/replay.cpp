@@ -99,7 +99,7 @@ class Calibrations {
     ReplayedCalibration c{.ended = session_.status(),
                           .points_sha256 = inputs_of(run).back().sha256,
                           .observed = observed(run)};
-    c.outcome = identify(run, config_, options_.active);
+    c.outcome = identify(run, config_, options_.active, {.stopped = options_.stopped});
     if (*c.outcome) {
       std::visit([this](auto& candidate) { judge_recording(recording_, candidate.verdict); },
                  **c.outcome);
@@ -352,14 +352,15 @@ class Replay : private PipelineObserver {
     }
     return {};
   }
-  [[nodiscard]] ReplayReport run() {
+  [[nodiscard]] Result<ReplayReport> run() {
     const auto range = recording_.time_range();
-    if (!range) return {};
+    if (!range) return ReplayReport{};
     begin_ = batch_.taken = range->first;
     report_.recorded = range->second - range->first;
     take_messages(Pace{options_.speed, begin_});
     pipeline_.finish(batch_.taken);
     report_.calibrations = calibrations_.finish();
+    if (stopped()) return fail(ErrorCode::DataInsufficient, "replay: stopped before its end");
     if (bytes_) report_.datums = marks_.compared(recording_);
     return std::move(report_);
   }
@@ -399,6 +400,7 @@ class Replay : private PipelineObserver {
     ids.push_back(event.model_id());
   }
 
+  [[nodiscard]] bool stopped() const { return options_.stopped && options_.stopped(); }
   void take_messages(const Pace& pace) {
     std::uint64_t messages = 0;
     auto cursor = recording_.messages();
@@ -408,8 +410,9 @@ class Replay : private PipelineObserver {
       published_ = message->published;
       pace.wait_for(message->taken);
       if (!deliver(*message, sink_)) ++report_.undecodable;
-      if (++messages % kMessagesPerProgress == 0 && options_.progress)
-        options_.progress(cursor.progress());
+      if (++messages % kMessagesPerProgress != 0) continue;
+      if (options_.progress) options_.progress(cursor.progress());
+      if (stopped()) return;
     }
     if (bytes_) bytes_->finish(batch_);
     end_cycle();

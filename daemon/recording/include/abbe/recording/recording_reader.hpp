@@ -77,8 +77,11 @@ class RecordingReader {
   class Cursor;
 
   /// Opens the file. Error (Io) if it cannot be read; Error (BadInput) if it is not a recording of
-  /// abbe (no MCAP magic, or truncated before the end of its metadata).
-  [[nodiscard]] static Result<RecordingReader> open(const std::filesystem::path& file);
+  /// abbe (no MCAP magic, or truncated before the end of its metadata). All of the file is read;
+  /// `stopped` is asked meanwhile on this thread and may be empty. DataInsufficient soon after it
+  /// returned true, which it must do from then on.
+  [[nodiscard]] static Result<RecordingReader> open(const std::filesystem::path& file,
+                                                    const std::function<bool()>& stopped = {});
   ~RecordingReader();
   RecordingReader(RecordingReader&&) noexcept;
   RecordingReader& operator=(RecordingReader&&) noexcept;

@@ -29,6 +29,9 @@ struct ReplayOptions {
   /// with no compensation.
   const calib::VolumetricModel* active = nullptr;
   std::function<void(double share)> progress;
+  /// Asked often, on the thread of the replay. Once it returned true, which it must do from then on,
+  /// the replay returns an Error soon.
+  std::function<bool()> stopped;
   /// Called for every cycle with the batch that the assembler gets, and with the time at which the
   /// first message of the recording was taken.
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples;
@@ -84,8 +87,9 @@ void judge_recording(const RecordingReader& recording, calib::Verdict& verdict);
 
 /// Replays the recording. `config` is the configuration of the live run
 /// (RecordingInfo::configuration). BadInput if an attachment that the replay needs cannot be read:
-/// a calibration request, a search for reference marks, or a datum. judge_recording() is already
-/// applied to the verdicts in the result.
+/// a calibration request, a search for reference marks, or a datum. DataInsufficient if
+/// ReplayOptions::stopped ended it. judge_recording() is already applied to the verdicts in the
+/// result.
 [[nodiscard]] Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
                                           const ReplayOptions& options);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The progress that a task reports.
+/// The progress that a task reports, and the wish to stop it.
 
 #include <functional>
 #include <string_view>
@@ -7,21 +7,27 @@
 
 namespace abbe::daemon {
 
-/// Receives the step that is under way and its share, 0 to 1. A task calls it from the thread that
-/// runs the task. Without a function nothing is shown.
+/// Receives the step that is under way and its share, 0 to 1, and states whether the task is to
+/// stop. A task calls it from the thread that runs the task. Without functions nothing is shown and
+/// no task is stopped.
 class Progress {
  public:
   using Show = std::function<void(std::string_view step, double share)>;
+  using Stopped = std::function<bool()>;
 
   Progress() = default;
-  explicit Progress(Show show) : show_(std::move(show)) {}
+  explicit Progress(Show show, Stopped stopped = {})
+      : show_(std::move(show)), stopped_(std::move(stopped)) {}
 
   void show(std::string_view step, double share) const {
     if (show_) show_(step, share);
   }
+  /// True: a task that says so returns an Error soon. Once true, it must stay true.
+  [[nodiscard]] bool stopped() const { return stopped_ && stopped_(); }
 
  private:
   Show show_;
+  Stopped stopped_;
 };
 
 }  // namespace abbe::daemon

@@ -10,7 +10,6 @@
 #include <chrono>
 #include <cstdio>
 #include <exception>
-#include <filesystem>
 #include <iostream>
 #include <string>
 #include <utility>
@@ -84,13 +83,6 @@ int hash_password(const std::string& user, const std::string& role_name) {
   return kDone;
 }
 
-/// `abbe` in the folder of abbe-web; if it is not there, the one in PATH.
-std::filesystem::path abbe_program() {
-  std::error_code error;
-  auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "abbe";
-  return !error && std::filesystem::exists(beside, error) ? beside : "abbe";
-}
-
 /// Tells systemd how the page is, and the log when that changes or kNoticePeriod has passed.
 class Health {
  public:
@@ -151,10 +143,8 @@ int serve(const std::string& file) {
   sigaddset(&stop, SIGTERM);
   sigaddset(&stop, SIGINT);
   pthread_sigmask(SIG_BLOCK, &stop, nullptr);
-  auto page = abbe::web::PageServer::start({.settings = std::move(*settings),
-                                            .config_file = file,
-                                            .abbe_program = abbe_program(),
-                                            .report = log_line});
+  auto page = abbe::web::PageServer::start(
+      {.settings = std::move(*settings), .config_file = file, .report = log_line});
   if (!page) return refuse(page.error());
 
   const bool v6 = web.address.find(':') != std::string::npos;

@@ -30,7 +30,8 @@ struct PageContext {
         sessions(options.settings.web.users,
                  {.idle = seconds_of(options.settings.web.session_idle)},
                  [this](const std::string& line) { report.always(line); }),
-        replays(options.abbe_program, options.settings.config.recording.dir),
+        replays(options.settings.config.recording.dir,
+                [this](const std::string& line) { report.always(line); }),
         pages(options.settings.web.most_pages),
         certificate_until(until_of(options.settings.web)),
         feed(

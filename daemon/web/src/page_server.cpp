@@ -123,6 +123,7 @@ class HttpPageServer final : public PageServer {
   ~HttpPageServer() override {
     context_.stopping = true;
     context_.models.stop();
+    context_.replays.stop();
     accepting_.reset();
     context_.board.close();
     server_.end_connections();

@@ -34,8 +34,7 @@ inline constexpr std::size_t kMostRequestBytes = 1u << 20;
 
 struct PageOptions {
   daemon::WebSettings settings;
-  std::filesystem::path config_file;            ///< shown as understood
-  std::filesystem::path abbe_program = "abbe";  ///< for replays
+  std::filesystem::path config_file;  ///< shown as understood
   std::chrono::milliseconds write_time_out = kWriteTimeOut, request_time = kRequestTime;
   /// Receives one line per event: log in, change, refusal, limit. Any thread.
   std::function<void(const std::string&)> report;

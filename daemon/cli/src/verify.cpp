@@ -145,52 +145,41 @@ Result<void> write_outputs(const std::filesystem::path& folder, const VerifyOutc
                       verification_report(outcome.document, outcome.verification));
 }
 
-int run(const VerifyCommand& arguments) {
+bool is_worse(const VerifyOutcome& outcome) {
+  return verify::effect_at_points(outcome.verification.comparison) == verify::Effect::Worse;
+}
+
+bool is_worse(const SeveralOutcome& outcome) {
+  return std::ranges::any_of(outcome.models, [](const ModelAtPoints& one) {
+    return verify::effect_at_points(one.comparison) == verify::Effect::Worse;
+  });
+}
+
+Result<void> show(const VerifyOutcome& outcome, const VerifyCommand& arguments) {
+  ABBE_TRY(write_outputs(arguments.out, outcome));
+  arguments.json ? print_json(outcome) : print_summary(outcome, arguments);
+  return {};
+}
+
+Result<void> show(const SeveralOutcome& outcome, const VerifyCommand& arguments) {
+  arguments.json ? print_json(outcome) : print_summary(outcome);
+  return {};
+}
+
+/// `task`: verify_model() or verify_several().
+template <class Task>
+int run(const VerifyCommand& arguments, const Task& task) {
   std::optional<Error> cut_short;
   ProgressBar bar;
-  const auto outcome = verify_model(arguments, cut_short, bar.progress());
+  const auto outcome = task(arguments, cut_short, bar.progress());
   bar.clear();
   if (!outcome) {
     const int code = report(outcome.error());
     return cut_short ? report(*cut_short) : code;
   }
-  if (const auto written = write_outputs(arguments.out, *outcome); !written)
-    return report(written.error());
-  arguments.json ? print_json(*outcome) : print_summary(*outcome, arguments);
+  if (const auto shown = show(*outcome, arguments); !shown) return report(shown.error());
   if (cut_short) return report(*cut_short);
-  const auto effect = verify::effect_at_points(outcome->verification.comparison);
-  return number(effect == verify::Effect::Worse ? ExitCode::Worse : ExitCode::Done);
-}
-
-/// Several models at the same points.
-int run_several(const VerifyCommand& arguments) {
-  const auto models = models_named(arguments.models, arguments.store, arguments.tool);
-  if (!models) return report(models.error());
-  std::vector<OfMachine> machines;
-  for (const NamedModel& model : *models) machines.push_back({model.name, model.machine});
-  SeveralOptions options{.json = arguments.json};
-  ProgressBar bar;
-  auto points =
-      points_of(arguments, std::move(machines), options.different_machines, bar.progress());
-  bar.clear();
-  if (!points) return report(points.error());
-  const auto observed = observed_in(arguments, points->file);
-  if (!observed) return report(observed.error());
-
-  const auto done = verify_several(*models, *observed, options);
-  const int code = done ? *done : report(done.error());
-  return points->cut_short ? report(*points->cut_short) : code;
-}
-
-/// The given option that has no effect with several models; empty: none. With --live, -o is the
-/// folder of the collected points.
-std::string only_for_one_model(const VerifyCommand& arguments) {
-  if (arguments.models.size() < 2) return {};
-  if (!arguments.out.empty() && !arguments.live_points) return "-o (report.html, grid.csv)";
-  if (!arguments.origin.empty()) return "--origin-mm";
-  if (!arguments.grid.empty()) return "--grid-mm";
-  if (!arguments.planes.empty()) return "--planes-mm";
-  return arguments.least_distance_mm ? "--least-distance-mm" : "";
+  return number(is_worse(*outcome) ? ExitCode::Worse : ExitCode::Done);
 }
 
 void add_options(CLI::App& command, VerifyCommand& arguments) {
@@ -267,18 +256,8 @@ void add_verify(CLI::App& parent, int& exit) {
 
   command->callback([arguments, &exit] {
     measure_live(*arguments);
-    const bool has_points =
-        !arguments->points.empty() || !arguments->recording.empty() || arguments->live_points;
-    if (!has_points)
-      exit = report({ErrorCode::Usage, "verify: give --points, --recording or --live"});
-    else if (arguments->live_points && arguments->out.empty())
-      exit =
-          report({ErrorCode::Usage, "verify --live: -o is required: the points are saved there"});
-    else if (const std::string wrong = only_for_one_model(*arguments); !wrong.empty())
-      exit =
-          report({ErrorCode::Usage, fmt::format("verify: {} is for one model; give one", wrong)});
-    else
-      exit = arguments->models.size() > 1 ? run_several(*arguments) : run(*arguments);
+    exit = arguments->models.size() > 1 ? run(*arguments, verify_several)
+                                        : run(*arguments, verify_model);
   });
 }
 

@@ -8,9 +8,8 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/tables/input_files.hpp"
-#include "abbe/tasks/model_source.hpp"
+#include "abbe/tasks/compared_model.hpp"
 #include "abbe/tasks/progress.hpp"
-#include "abbe/tasks/same_machine.hpp"
 #include "abbe/tasks/verification_report.hpp"
 
 namespace abbe::daemon {
@@ -55,13 +54,27 @@ struct VerifyOutcome {
                                                  std::optional<Error>& cut_short,
                                                  const Progress& progress);
 
-/// The points for models of `machines`. They must be of the same machine, as far as it is known: a
-/// file of points does not state it. `different`: different_machines().
-[[nodiscard]] Result<LivePoints> points_of(const VerifyArguments& arguments,
-                                           std::vector<OfMachine> machines, std::string& different,
-                                           const Progress& progress);
-/// The points in the frame that the arguments name; an error names points that alone do not fit.
-[[nodiscard]] Result<calib::verify::Observations> observed_in(const VerifyArguments& arguments,
-                                                              const VerificationFile& file);
+/// A model at the places that are compared.
+struct ModelAtPoints {
+  ComparedModel model;
+  calib::Vector3 tool_m = calib::Vector3::Zero();
+  calib::verify::Comparison comparison{};  ///< compare_at_points()
+};
+
+/// All models at the same places: those that are inside the validity volume of every one.
+struct SeveralOutcome {
+  std::vector<ModelAtPoints> models;         ///< in the order of the arguments
+  calib::verify::Observations observations;  ///< of all places
+  std::size_t inside_all = 0;                ///< places that are compared
+  std::string different_machines;            ///< different_machines()
+};
+
+/// All `arguments.models` against the points, for example of runs at several feeds. Usage: an
+/// argument that is for one model; different tool offsets of the models without `arguments.tool`.
+/// DataInsufficient: fewer than 4 places inside the validity volume of all models. Sets `cut_short`
+/// if points are missing.
+[[nodiscard]] Result<SeveralOutcome> verify_several(const VerifyArguments& arguments,
+                                                    std::optional<Error>& cut_short,
+                                                    const Progress& progress);
 
 }  // namespace abbe::daemon

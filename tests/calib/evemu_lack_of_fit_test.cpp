@@ -36,6 +36,16 @@ Observations observed(const ArrayRun& run, const ObserveOptions& options = {}) {
   return *observe(run.touches, run.calibrator, run.machine, options);
 }
 
+/// Of a sound run, solved once.
+const Observations& sound_observations() {
+  static const Observations o = observed({});
+  return o;
+}
+const Solution& sound_solution() {
+  static const Solution solution = *solve(sound_observations());
+  return solution;
+}
+
 struct ArrayFault {
   Cause cause;
   std::string words;
@@ -143,9 +153,8 @@ TEST(EvemuJudge, RefusesWhatAFaultMovesByMoreThanItsUncertainty) {
 // A ball whose touches have no position in the order: alternatives that depend on time have no
 // columns.
 TEST(EvemuJudge, RefusesARunThatCannotBeComparedWithAnAlternative) {
-  const Observations o = observed({});
-  const Solution solution = *solve(o);
-  Observations broken = o;
+  const Solution& solution = sound_solution();
+  Observations broken = sound_observations();
   broken.seen[2].ball_index[4] = std::numeric_limits<double>::quiet_NaN();
   const Verdict verdict = *judge(broken, solution, nullptr, wide_limits());
   EXPECT_FALSE(verdict.accepted);
@@ -154,8 +163,8 @@ TEST(EvemuJudge, RefusesARunThatCannotBeComparedWithAnAlternative) {
 }
 
 TEST(EvemuLackOfFit, NamesTouchesThatNoSurfaceFits) {
-  Observations o = observed({});
-  const Solution solution = *solve(o);
+  Observations o = sound_observations();
+  const Solution& solution = sound_solution();
   o.seen[1].ball_points_m[2][0].x() = std::numeric_limits<double>::quiet_NaN();
   const TouchResiduals residuals = touch_residuals(o, solution.model, 1e-5);
   EXPECT_THAT(residuals.failed, testing::ElementsAre("position 2, ball 3"));
@@ -171,22 +180,20 @@ TEST(EvemuJudge, NotesADesignThatDoesNotExist) {
 }
 
 TEST(EvemuJudge, StopsBetweenAlternatives) {
-  const Observations o = observed({});
   JudgeOptions options = wide_limits();
   int asked = 0;
   options.watch.stopped = [&] { return ++asked == 20; };
-  const auto verdict = judge(o, *solve(o), nullptr, options);
+  const auto verdict = judge(sound_observations(), sound_solution(), nullptr, options);
   ASSERT_FALSE(verdict);
   EXPECT_EQ(verdict.error().code, ErrorCode::NotConverged);
   EXPECT_EQ(asked, 20);
 }
 
 TEST(EvemuJudge, ReportsProgressUpToTheEnd) {
-  const Observations o = observed({});
   JudgeOptions options = wide_limits();
   std::vector<double> fractions;
   options.watch.progress = [&](double fraction) { fractions.push_back(fraction); };
-  ASSERT_TRUE(judge(o, *solve(o), nullptr, options));
+  ASSERT_TRUE(judge(sound_observations(), sound_solution(), nullptr, options));
   ASSERT_THAT(fractions, Not(IsEmpty()));
   EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
   EXPECT_DOUBLE_EQ(fractions.back(), 1.0);
@@ -303,13 +310,13 @@ ArrayRun with_slow_noise(double sd_m) {
 }
 
 TEST(EvemuLackOfFit, FindsTheSizeOfSlowNoise) {
-  const Solution plain = *solve(observed({}));
+  const Solution& plain = sound_solution();
   EXPECT_EQ(plain.slow_noise, 0.0);
   const Solution slow = *solve(observed(with_slow_noise(20e-6)));
   // 64 balls and the share that the estimation absorbs: accuracy one third.
   EXPECT_NEAR(slow.statistics.slow_noise_m, 20e-6, 7e-6);
-  EXPECT_GT(correction_size(observed({}), slow).u_m,
-            1.5 * correction_size(observed({}), plain).u_m);
+  EXPECT_GT(correction_size(sound_observations(), slow).u_m,
+            1.5 * correction_size(sound_observations(), plain).u_m);
 }
 
 TEST(EvemuJudge, NotesSlowNoise) {

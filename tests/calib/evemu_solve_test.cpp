@@ -22,12 +22,19 @@ using namespace abbe::tests::evemu;
 using testing::Contains;
 using testing::HasSubstr;
 
-Observations reference_observations() {
-  return *observe_errors(reference_errors(), reference_machine(), RotationOrigin::Independent);
+/// Observed and solved once.
+const Observations& reference_observations() {
+  static const Observations o =
+      *observe_errors(reference_errors(), reference_machine(), RotationOrigin::Independent);
+  return o;
+}
+const Solution& reference_solution() {
+  static const Solution solution = *solve(reference_observations());
+  return solution;
 }
 
 TEST(EvemuLeastSquares, AgreesWithTheReferenceInStandardisedUnits) {
-  const Observations o = reference_observations();
+  const Observations& o = reference_observations();
   const auto solution = solve(o, {.estimator = Estimator::Ols});
   ASSERT_TRUE(solution) << solution.error().text;
   const ScaledDesign& design = solution->model.polynomials()->design();
@@ -139,7 +146,7 @@ TEST(EvemuBayes, SeesTheShapeOfAMachineThatMeasuredItsOwnBlocks) {
 
 TEST(EvemuSolution, IsZeroAtBall1) {
   for (const Estimator e : {Estimator::Ols, Estimator::Ridge, Estimator::BayesPose}) {
-    const Observations o = reference_observations();
+    const Observations& o = reference_observations();
     const Solution s = *solve(o, {.estimator = e});
     const VolumetricError at = s.model.error_at(o.ball1_m, Vector3::Zero());
     EXPECT_LT(at.V_m.norm(), 1e-15);
@@ -149,13 +156,13 @@ TEST(EvemuSolution, IsZeroAtBall1) {
 }
 
 TEST(EvemuSolution, HoldsForItsToolOnly) {
-  const Solution s = *solve(reference_observations());
+  const Solution& s = reference_solution();
   EXPECT_FALSE(s.model.error_at({0.2, 0.2, 0.04}, {0, 0, 0.05}).tool_ok);
   EXPECT_FALSE(s.model.error_at({0.2, 0.2, 0.5}, Vector3::Zero()).inside);
 }
 
 TEST(EvemuSolution, PropagatesItsFullCovariance) {
-  const Solution s = *solve(reference_observations());
+  const Solution& s = reference_solution();
   const PolynomialModel& m = *s.model.polynomials();
   for (const Vector3& q :
        {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.0, 0.07), Vector3(0.3, 0.15, 0.01)}) {
@@ -169,7 +176,7 @@ TEST(EvemuSolution, PropagatesItsFullCovariance) {
 }
 
 TEST(EvemuSolution, ComesBackFromItsDescriptionBitForBit) {
-  const Solution s = *solve(reference_observations());
+  const Solution& s = reference_solution();
   const auto again = VolumetricModel::from_description(s.model.description());
   ASSERT_TRUE(again) << again.error().text;
   const Vector3 q(0.31, 0.17, 0.05);
@@ -180,7 +187,7 @@ TEST(EvemuSolution, ComesBackFromItsDescriptionBitForBit) {
 }
 
 TEST(EvemuSolution, CorrectsACommand) {
-  const Solution s = *solve(reference_observations());
+  const Solution& s = reference_solution();
   const Vector3 p(0.4, 0.1, 0.05);
   const auto c = s.model.command_correction(p, Vector3::Zero());
   ASSERT_TRUE(c);
@@ -217,7 +224,7 @@ TEST(RotationReference, TurnsAShapeOntoWhatIsKnown) {
 }
 
 TEST(RotationReference, NeedsPointsOffALine) {
-  const Solution s = *solve(reference_observations());
+  const Solution& s = reference_solution();
   const std::vector<BallError> line{{1, 1, {0.3, 0.15, 0.05}, {0, 0, 0}},
                                     {1, 2, {0.35, 0.15, 0.05}, {0, 0, 0}},
                                     {1, 3, {0.4, 0.15, 0.05}, {0, 0, 0}}};
@@ -375,8 +382,8 @@ TEST(RotationReference, StatesAnUncertaintyThatCovers) {
 }
 
 TEST(EvemuJudge, AcceptsAModelOfTheMachineItWasMeasuredOn) {
-  const Observations o = reference_observations();
-  const auto verdict = judge(o, *solve(o), nullptr, generous());
+  const Observations& o = reference_observations();
+  const auto verdict = judge(o, reference_solution(), nullptr, generous());
   ASSERT_TRUE(verdict) << verdict.error().text;
   EXPECT_TRUE(verdict->accepted) << verdict->reasons.front();
   EXPECT_GT(verdict->held_out.no_compensation, 20 * verdict->held_out.candidate);
@@ -414,14 +421,14 @@ TEST(EvemuJudge, CallsAShapeAShapeUnlessToldOtherwise) {
 }
 
 TEST(EvemuJudge, SaysThatTheArtefactOfGivenErrorsIsNotInTheCovariance) {
-  const Observations o = reference_observations();
-  EXPECT_THAT(judge(o, *solve(o), nullptr, generous())->notes,
+  const Observations& o = reference_observations();
+  EXPECT_THAT(judge(o, reference_solution(), nullptr, generous())->notes,
               Contains(HasSubstr("own uncertainty and temperature are not in the covariance")));
 }
 
 TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
-  const Observations o = reference_observations();
-  const Solution s = *solve(o);
+  const Observations& o = reference_observations();
+  const Solution& s = reference_solution();
   std::vector<Vector3> near;
 
   for (const Vector3& v : s.model.validity().vertices_m()) {
@@ -447,8 +454,8 @@ TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
 }
 
 TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {
-  const Observations o = reference_observations();
-  const Solution s = *solve(o);
+  const Observations& o = reference_observations();
+  const Solution& s = reference_solution();
   const PolynomialModel& m = *s.model.polynomials();
   const Eigen::VectorXd turned =
       m.c_m() + m.design().rotation_about(m.ball1_m()) * Vector3(1e-3, 2e-3, -1e-3);

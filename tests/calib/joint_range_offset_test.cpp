@@ -6,15 +6,19 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abbe/calib/model/model_update.hpp"
 #include "joint_parts.hpp"
+#include "repetitions.hpp"
 
 namespace {
 namespace joint = abbe::calib::joint;
 namespace otf = abbe::calib::otf;
+using abbe::calib::TrackerPlace;
 using abbe::calib::VolumetricModel;
 using abbe::tests::otf::MadeRun;
 using abbe::tests::otf::make_run;
@@ -39,6 +43,16 @@ otf::Solution solution_of(const MadeRun& run) {
   return otf::identify(run.samples, run.machine, run.path, run.noise, run.options)->solution;
 }
 
+/// Of run_with_offset() with the usual prior, each identified once.
+const otf::Solution& solution_with_offset(double offset_m, unsigned noise_seed) {
+  static std::map<std::pair<double, unsigned>, otf::Solution> found;
+  const std::pair key(offset_m, noise_seed);
+  if (const auto one = found.find(key); one != found.end()) {
+    return one->second;
+  }
+  return found.emplace(key, solution_of(run_with_offset(offset_m, noise_seed))).first->second;
+}
+
 joint::Part part_of(const std::string& name, const otf::Solution& solution,
                     const joint::CommonTables& common, const std::string& offset) {
   joint::CommonEffects effects;
@@ -57,7 +71,7 @@ double difference_in_u(const VolumetricModel& a, const VolumetricModel& b) {
 }
 
 TEST(OffsetOfAPlace, OfOneRunAloneIsItsOwn) {
-  const otf::Solution run = solution_of(run_with_offset(30e-6, 1));
+  const otf::Solution& run = solution_with_offset(30e-6, 1);
   const joint::CommonTables common = *joint::tables_of(run.model);
   const std::vector with{part_of("run", run, common, "home 1")},
       without{part_of("run", run, common, "")};
@@ -78,8 +92,8 @@ TEST(OffsetOfAPlace, OfOneRunAloneIsItsOwn) {
 /// Two runs know the common offset better than one: by 1 / sqrt(2) where the prior does not count.
 TEST(OffsetOfAPlace, OfTwoRunsIsKnownFromBothAndThePriorCountsOnce) {
   constexpr double kOffset_m = 30e-6;
-  const otf::Solution one = solution_of(run_with_offset(kOffset_m, 1)),
-                      two = solution_of(run_with_offset(kOffset_m, 2));
+  const otf::Solution &one = solution_with_offset(kOffset_m, 1),
+                      &two = solution_with_offset(kOffset_m, 2);
   const joint::CommonTables common = *joint::tables_of(one.model);
   const std::vector parts{part_of("run 1", one, common, "home 1"),
                           part_of("run 2", two, common, "home 1")};
@@ -98,8 +112,7 @@ TEST(OffsetOfAPlace, OfTwoRunsIsKnownFromBothAndThePriorCountsOnce) {
 
 /// Runs of another home position have another offset: named as the same, they contradict.
 TEST(OffsetOfAPlace, ThatIsNotSharedIsAContradiction) {
-  const otf::Solution one = solution_of(run_with_offset(60e-6, 1)),
-                      two = solution_of(run_with_offset(-60e-6, 2));
+  const otf::Solution &one = solution_with_offset(60e-6, 1), &two = solution_with_offset(-60e-6, 2);
   const joint::CommonTables common = *joint::tables_of(one.model);
   const auto contradictions = [&](const std::string& first, const std::string& second) {
     const std::vector parts{part_of("run 1", one, common, first),
@@ -116,7 +129,7 @@ TEST(OffsetOfAPlace, ThatIsNotSharedIsAContradiction) {
 /// Four pairs of runs with a common offset: 31 combinations each, the mean scatters by 0.13.
 TEST(OffsetOfAPlace, UncertaintyIsHonest) {
   double normalised = 0.0;
-  constexpr unsigned kPairs = 4;
+  constexpr unsigned kPairs = abbe::tests::repetitions(4u);
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   for (unsigned pair = 0; pair < kPairs; ++pair) {
@@ -132,10 +145,15 @@ TEST(OffsetOfAPlace, UncertaintyIsHonest) {
     const Eigen::VectorXd error = joint->model.U() - first.truth;
     const Eigen::MatrixXd C = joint->model.covariance();
     const auto inverse = C.completeOrthogonalDecomposition();
-    normalised += error.dot(inverse.solve(error)) / static_cast<double>(inverse.rank()) / kPairs;
+    const double of_pair = error.dot(inverse.solve(error)) / static_cast<double>(inverse.rank());
+    EXPECT_GT(of_pair, 0.0);
+    EXPECT_LT(of_pair, 10.0);
+    normalised += of_pair / kPairs;
   }
   RecordProperty("mean_squared_normalised_error", std::to_string(normalised));
-  EXPECT_NEAR(normalised, 1.0, 0.3);
+  if (abbe::tests::kAllRepetitions) {
+    EXPECT_NEAR(normalised, 1.0, 0.3);
+  }
 }
 
 TEST(OffsetOfAPlace, NeedsAnEstimateOfTheRun) {
@@ -160,8 +178,7 @@ double squared_normalised_error(const VolumetricModel& model, const MadeRun& tru
 }
 
 TEST(RangeOffsetOfUpdates, IsThatOfTheJointIdentification) {
-  const otf::Solution one = solution_of(run_with_offset(30e-6, 1)),
-                      two = solution_of(run_with_offset(30e-6, 2));
+  const otf::Solution &one = solution_with_offset(30e-6, 1), &two = solution_with_offset(30e-6, 2);
   const joint::CommonTables common = *joint::tables_of(one.model);
   const std::vector parts{part_of("run 1", one, common, "home 1"),
                           part_of("run 2", two, common, "home 1")};
@@ -186,7 +203,7 @@ TEST(RangeOffsetOfUpdates, IsThatOfTheJointIdentification) {
 /// new in each of them would seem to average out.
 TEST(RangeOffsetOfUpdates, DoesNotAverageOut) {
   constexpr double kU_m = 0.3e-6, kOffset_m = 0.45e-6;
-  constexpr unsigned kRuns = 20;
+  constexpr unsigned kRuns = abbe::tests::repetitions(20u);
   const MadeRun first = run_with_offset(kOffset_m, 1, kU_m);
   abbe::calib::ModelWithOffset with = with_offset(solution_of(first)), without{with.model};
   for (unsigned k = 2; k <= kRuns; ++k) {
@@ -200,14 +217,15 @@ TEST(RangeOffsetOfUpdates, DoesNotAverageOut) {
                lost = squared_normalised_error(without.model, first);
   RecordProperty("kept", std::to_string(kept));
   RecordProperty("lost", std::to_string(lost));
-  EXPECT_NEAR(kept, 1.0, 0.5);
-  EXPECT_GT(lost, 1.5 * kept);
+  if (abbe::tests::kAllRepetitions) {
+    EXPECT_NEAR(kept, 1.0, 0.5);
+    EXPECT_GT(lost, 1.5 * kept);
+  }
   EXPECT_NEAR(with.range_offset->value_m, kOffset_m, 4.0 * with.range_offset->u_m);
 }
 
 TEST(RangeOffsetOfUpdates, OfAnotherPlaceIsNotTheSame) {
-  const otf::Solution one = solution_of(run_with_offset(60e-6, 1)),
-                      two = solution_of(run_with_offset(-60e-6, 2));
+  const otf::Solution &one = solution_with_offset(60e-6, 1), &two = solution_with_offset(-60e-6, 2);
   const auto refused = update_model(with_offset(one), with_offset(two), {});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, abbe::calib::ErrorCode::NotApplicable);
@@ -233,8 +251,7 @@ TEST(RangeOffsetOfUpdates, HasOneDerivativeForEachParameterWithBacklash) {
 
 /// Forgotten information lets the offset follow a slow change.
 TEST(RangeOffsetOfUpdates, IsForgottenAsTheTablesAre) {
-  const otf::Solution one = solution_of(run_with_offset(30e-6, 1)),
-                      two = solution_of(run_with_offset(30e-6, 2));
+  const otf::Solution &one = solution_with_offset(30e-6, 1), &two = solution_with_offset(30e-6, 2);
   const auto all = update_model(with_offset(one), with_offset(two), {});
   const auto half = update_model(with_offset(one), with_offset(two), {.forgetting = 0.5});
   ASSERT_TRUE(all && half);
@@ -243,7 +260,7 @@ TEST(RangeOffsetOfUpdates, IsForgottenAsTheTablesAre) {
 }
 
 TEST(RangeOffsetOfUpdates, OfAnotherNumberOfParametersIsRefused) {
-  const otf::Solution run = solution_of(run_with_offset(60e-6, 1));
+  const otf::Solution& run = solution_with_offset(60e-6, 1);
   auto damaged = with_offset(run);
   damaged.range_offset->dU_dd.conservativeResize(3);
   const auto refused = update_model(damaged, with_offset(run), {});

@@ -4,17 +4,21 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <map>
 #include <string>
 
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
+#include "repetitions.hpp"
 #include "stream_faults.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
+using abbe::tests::kAllRepetitions;
+using abbe::tests::repetitions;
 using testing::Contains;
 using testing::HasSubstr;
 
@@ -32,6 +36,15 @@ Result<AlignedBlocks> aligned_blocks_of(const MadeRun& run) {
 
 Result<Identification> identified_run(const MadeRun& run) {
   return identify(run.samples, run.machine, run.path, run.noise, run.options);
+}
+
+/// Of noisy_run(), each machine identified once.
+const Identification& identified_clean(unsigned seed) {
+  static std::map<unsigned, Identification> found;
+  if (const auto one = found.find(seed); one != found.end()) {
+    return one->second;
+  }
+  return found.emplace(seed, *identified_run(noisy_run(seed))).first->second;
 }
 
 double mean_error_of_tables_m(const MadeRun& run, const VolumetricModel& model) {
@@ -69,7 +82,7 @@ TEST(AlignedBlocks, AreThoseOfAllSamplesInASoundRun) {
     ASSERT_TRUE(robust && all);
     EXPECT_FALSE(robust->series.set_aside.any());
     const auto as_before = identify_blocks(*all, run.machine, run.path, run.noise, run.options);
-    EXPECT_EQ(identified_run(run)->solution.model.U(), as_before->solution.model.U());
+    EXPECT_EQ(identified_clean(seed).solution.model.U(), as_before->solution.model.U());
   }
 }
 
@@ -95,19 +108,22 @@ class FaultOfStream : public testing::TestWithParam<StreamFault> {};
 // parameters of three runs the mean square of error / u is as far from 1 as without the fault.
 TEST_P(FaultOfStream, HardlyChangesTheModel) {
   double clean_m = 0.0, faulty_m = 0.0, clean_squares = 0.0, faulty_squares = 0.0;
-  for (const unsigned seed : {1U, 2U, 3U}) {
+  for (unsigned seed = 1; seed <= repetitions(3u); ++seed) {
     MadeRun run = noisy_run(seed);
-    const auto clean = identified_run(run);
+    const Identification& clean = identified_clean(seed);
     std::mt19937_64 random(100 + seed);
     GetParam().put_in(run.samples, random);
     const auto faulty = identified_run(run);
     ASSERT_TRUE(faulty) << faulty.error().text;
-    clean_m += mean_error_of_tables_m(run, clean->solution.model);
+    clean_m += mean_error_of_tables_m(run, clean.solution.model);
     faulty_m += mean_error_of_tables_m(run, faulty->solution.model);
-    clean_squares += mean_squared_normalised(run, clean->solution.model);
+    clean_squares += mean_squared_normalised(run, clean.solution.model);
     faulty_squares += mean_squared_normalised(run, faulty->solution.model);
     const Verdict verdict = verdict_of(run, *faulty);
     EXPECT_TRUE(verdict.accepted) << verdict.reasons.front();
+  }
+  if (!kAllRepetitions) {
+    return;
   }
   EXPECT_LT(faulty_m, 1.15 * clean_m);
   EXPECT_NEAR(faulty_squares, clean_squares, 0.25 * clean_squares);
@@ -153,7 +169,7 @@ TEST(AlignedBlocks, CountWhatIsSetAside) {
 // Samples at the vertices are in no row; they must not confuse alignment and legs.
 TEST(AlignedBlocks, OutliersAtTheVerticesChangeNothing) {
   MadeRun run = noisy_run(2);
-  const double clean_m = mean_error_of_tables_m(run, identified_run(run)->solution.model);
+  const double clean_m = mean_error_of_tables_m(run, identified_clean(2).solution.model);
   std::mt19937_64 random(1);
   const auto aligned = aligned_blocks_of(run);
   for (std::size_t b = 0; b < aligned->series.blocks.size(); ++b) {
@@ -167,7 +183,7 @@ TEST(AlignedBlocks, OutliersAtTheVerticesChangeNothing) {
 
 TEST(AlignedBlocks, GiveALegOfBadSamplesLittleWeight) {
   MadeRun run = noisy_run(3);
-  const double clean_m = mean_error_of_tables_m(run, identified_run(run)->solution.model);
+  const double clean_m = mean_error_of_tables_m(run, identified_clean(3).solution.model);
   std::mt19937_64 random(1);
   const auto aligned = aligned_blocks_of(run);
   for (std::size_t b = 0; b < aligned->series.blocks.size(); ++b) {
@@ -184,7 +200,7 @@ TEST(AlignedBlocks, GiveALegOfBadSamplesLittleWeight) {
 
 TEST(AlignedBlocks, RefuseAReflectorWithinReachOfABreakOrSetItAside) {
   MadeRun run = noisy_run(1);
-  const double clean_m = mean_error_of_tables_m(run, identified_run(run)->solution.model);
+  const double clean_m = mean_error_of_tables_m(run, identified_clean(1).solution.model);
   std::mt19937_64 random(4);
   add_other_target(run.samples, 5.0, 1.0, 0.1, random);
   const auto found = identified_run(run);

@@ -9,11 +9,14 @@
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
+#include "repetitions.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
+using abbe::tests::kAllRepetitions;
+using abbe::tests::repetitions;
 
 /// "[w Y' b X Z (C1) t]": the axes in the order from w to t, the first `carried` of them between
 /// workpiece and bed.
@@ -80,7 +83,7 @@ struct Normalised {
 
 TEST_P(AxisOrder, HasTheErrorsThatItStates) {
   Normalised all;
-  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+  for (unsigned seed = 1; seed <= repetitions(4u); ++seed) {
     const MadeRun run = make_run({.seed = seed,
                                   .noise_seed = seed,
                                   .error_scale_m = 10e-6,
@@ -93,8 +96,10 @@ TEST_P(AxisOrder, HasTheErrorsThatItStates) {
 
   // chi-square of n combinations: mean 1 after division by n, standard deviation sqrt(2 / n)
   const auto n = static_cast<double>(all.combinations);
-  EXPECT_GT(n, 100.0);
-  EXPECT_NEAR(all.squares / n, 1.0, 3.0 * std::sqrt(2.0 / n));
+  EXPECT_GT(n, kAllRepetitions ? 100.0 : 50.0);
+  if (kAllRepetitions) {
+    EXPECT_NEAR(all.squares / n, 1.0, 3.0 * std::sqrt(2.0 / n));
+  }
 }
 
 TEST_P(AxisOrder, IsAcceptedByTheGate) {

@@ -13,12 +13,14 @@
 #include "abbe/calib/otf/identify/targets.hpp"
 #include "backlash_run.hpp"
 #include "encoder_run.hpp"
+#include "repetitions.hpp"
 #include "standstill_run.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
+using abbe::tests::repetitions;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -84,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(OtfEstimators, BacklashOfARun,
                          testing::Values(Estimator::TwoStep, Estimator::Joint));
 
 TEST_P(BacklashOfARun, IsFoundWithItsSignAndTheModelIsTheMeanOfBothDirections) {
-  for (unsigned seed = 1; seed <= 3; ++seed) {
+  for (unsigned seed = 1; seed <= repetitions(3u); ++seed) {
     const BacklashOfRun truth = backlash_of_14_tables(seed);
     const MadeRun run = make_backlash_run({.seed = seed, .noise_seed = seed}, truth);
     const auto id = identified_with(run, TravelDependence::Backlash, GetParam());
@@ -107,7 +109,7 @@ TEST_P(BacklashOfARun, RefusesTheModelOnlyWhereItIsNotEstimated) {
 }
 
 TEST_P(BacklashOfARun, IsZeroOnAMachineWithoutItAndCostsLittle) {
-  for (unsigned seed = 1; seed <= 3; ++seed) {
+  for (unsigned seed = 1; seed <= repetitions(3u); ++seed) {
     const MadeRun run = make_run({.seed = seed, .noise_seed = seed});
     const auto with = identified_with(run, TravelDependence::Backlash, GetParam());
     const auto without = identified_with(run, TravelDependence::None, GetParam());

@@ -14,6 +14,7 @@
 #include "abbe/calib/otf/judge/judge.hpp"
 #include "nest_run.hpp"
 #include "normalised_error.hpp"
+#include "repetitions.hpp"
 #include "standstill_run.hpp"
 
 namespace {
@@ -86,19 +87,24 @@ double mean_normalised(const MadeRun& run, const VolumetricModel& model) {
 /// independent values of each model it would be 0.7 to 1.35; one half more for values that are
 /// correlated.
 TEST(Nests, DriftRaisesTheErrorByLessThanAFifthAndTheUncertaintyHolds) {
-  constexpr unsigned kMachines = 3;
+  constexpr unsigned kMachines = abbe::tests::repetitions(3u);
   double with_m = 0.0, without_m = 0.0, normalised = 0.0;
   for (unsigned seed = 1; seed <= kMachines; ++seed) {
     const NestResult with = seed == 1 ? with_drift_and_nests()
                                       : result_of(two_nests({.seed = seed, .drift_m = kDrift_m}));
     with_m += with.error_m();
-    normalised += mean_normalised(with.run, with.id.solution.model) / kMachines;
+    const double of_run = mean_normalised(with.run, with.id.solution.model);
+    EXPECT_GT(of_run, 0.0);
+    EXPECT_LT(of_run, 10.0);
+    normalised += of_run / kMachines;
     without_m +=
         seed == 1 ? error_without_drift_m() : result_of({.seed = seed, .visits = false}).error_m();
   }
-  EXPECT_LE(with_m, 1.2 * without_m);
-  EXPECT_GE(normalised, 0.55);
-  EXPECT_LE(normalised, 1.5);
+  if (abbe::tests::kAllRepetitions) {
+    EXPECT_LE(with_m, 1.2 * without_m);
+    EXPECT_GE(normalised, 0.55);
+    EXPECT_LE(normalised, 1.5);
+  }
 }
 
 TEST(Nests, DriftWithoutNestsSpoilsTheModelAndIsNamed) {

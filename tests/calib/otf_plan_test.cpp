@@ -29,9 +29,20 @@ double rms_um(const Path& path, const PlannedRun& run = few_nodes()) {
   return p ? 1e6 * p->rms_u_m : std::nan("");
 }
 
+/// Paths of kLength_m, planned once.
+const Result<PlannedPath>& walked() {
+  static const Result<PlannedPath> planned = plan(few_nodes(), {.length_m = kLength_m}, kWalk);
+  return planned;
+}
+const Result<PlannedPath>& exchanged() {
+  static const Result<PlannedPath> planned =
+      plan(few_nodes(), {.length_m = kLength_m}, {.lattice = 3, .exchanges = 300});
+  return planned;
+}
+
 TEST(OtfPlan, IsBetterThanTheBasePathAndNoLongerThanItsBudget) {
   const Path base = base_path(few_nodes().machine.nodes);
-  const auto planned = plan(few_nodes(), {.length_m = kLength_m}, kWalk);
+  const auto& planned = walked();
   ASSERT_TRUE(planned) << planned.error().text;
   const double length_m = lengths_to_vertices_m(planned->path).back();
   EXPECT_LE(length_m, kLength_m);
@@ -44,7 +55,7 @@ TEST(OtfPlan, IsBetterThanTheBasePathAndNoLongerThanItsBudget) {
 }
 
 TEST(OtfPlan, EstimateIsThePredictedUncertainty) {
-  const auto planned = plan(few_nodes(), {.length_m = kLength_m}, kWalk);
+  const auto& planned = walked();
   ASSERT_TRUE(planned) << planned.error().text;
   EXPECT_NEAR(1e6 * planned->rms_u_m, rms_um(planned->path), 0.02 * rms_um(planned->path));
 }
@@ -53,25 +64,22 @@ TEST(OtfPlan, EstimateIsThePredictedUncertainty) {
 TEST(OtfPlan, DeterminesAnOffsetOfTheRanges) {
   PlannedRun run = few_nodes();
   run.noise.u_range_offset_m = 50e-6;
-  const PlanOptions improved{.lattice = 3, .exchanges = 300};
-  const auto with = plan(run, {.length_m = kLength_m}, improved),
-             without = plan(few_nodes(), {.length_m = kLength_m}, improved);
+  const auto with = plan(run, {.length_m = kLength_m}, {.lattice = 3, .exchanges = 300});
+  const auto& without = exchanged();
   ASSERT_TRUE(with && without);
   EXPECT_NEAR(1e6 * with->rms_u_m, rms_um(with->path, run), 0.02 * rms_um(with->path, run));
   EXPECT_LT(rms_um(with->path, run), rms_um(without->path, run));
 }
 
 TEST(OtfPlan, IsImprovedAfterTheWalk) {
-  const auto walk = plan(few_nodes(), {.length_m = kLength_m}, kWalk);
-  const auto improved =
-      plan(few_nodes(), {.length_m = kLength_m}, {.lattice = 3, .exchanges = 300});
+  const auto &walk = walked(), &improved = exchanged();
   ASSERT_TRUE(walk && improved);
   EXPECT_LT(improved->rms_u_m, walk->rms_u_m);
   EXPECT_LE(lengths_to_vertices_m(improved->path).back(), kLength_m);
 }
 
 TEST(OtfPlan, IsTheSameEveryTime) {
-  const auto once = plan(few_nodes(), {.length_m = kLength_m}, kWalk);
+  const auto& once = walked();
   const auto again = plan(few_nodes(), {.length_m = kLength_m}, kWalk);
   ASSERT_TRUE(once && again);
   EXPECT_EQ(once->path.vertices_m, again->path.vertices_m);

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <map>
 
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
@@ -74,6 +76,21 @@ struct Stream {
   double asked_mean_m;
 };
 
+/// Each stream is identified once with each estimator.
+const Result<Identification>& identified_stream(const std::filesystem::path& file,
+                                                Estimator estimator) {
+  static std::map<std::pair<std::filesystem::path, Estimator>, Result<Identification>> found;
+  const std::pair key(file, estimator);
+  if (const auto one = found.find(key); one != found.end()) {
+    return one->second;
+  }
+  Options options;
+  options.estimator = estimator;
+  return found
+      .emplace(key, identify(read_stream(file), case_a_machine(), case_a_path(), {}, options))
+      .first->second;
+}
+
 class CaseAStream : public testing::TestWithParam<Stream> {
  protected:
   void SetUp() override {
@@ -81,13 +98,11 @@ class CaseAStream : public testing::TestWithParam<Stream> {
     if (!file) {
       GTEST_SKIP() << GetParam().file << " is not there: set ABBE_REF_DIR";
     }
-    Options options;
-    options.estimator = GetParam().estimator;
-    const auto id = identify(read_stream(*file), case_a_machine(), case_a_path(), {}, options);
+    const auto& id = identified_stream(*file, GetParam().estimator);
     ASSERT_TRUE(id) << id.error().text;
-    id_.emplace(*id);
+    id_ = &*id;
   }
-  std::optional<Identification> id_;
+  const Identification* id_ = nullptr;
 };
 INSTANTIATE_TEST_SUITE_P(
     Noise, CaseAStream,

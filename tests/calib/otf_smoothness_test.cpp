@@ -14,6 +14,7 @@
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
 #include "normalised_error.hpp"
+#include "repetitions.hpp"
 #include "smooth_run.hpp"
 #include "standstill_run.hpp"
 
@@ -124,7 +125,7 @@ TEST(SmoothnessPrior, OfNoAxisGivesTheSameBitsAsNoPrior) {
 /// machines: rms 0.385 um without, 0.327 um with the prior; normalised 1.00 and 0.98.
 TEST(SmoothnessPrior, ReducesTheErrorAndItsUncertaintyAlike) {
   double without_m2 = 0.0, with_m2 = 0.0, normalised = 0.0;
-  constexpr unsigned kMachines = 4;
+  constexpr unsigned kMachines = abbe::tests::repetitions(4u);
   for (unsigned seed = 1; seed <= kMachines; ++seed) {
     const MadeRun run = smooth_run({.seed = seed});
     const auto without = identified_with(run, {}), with = identified_with(run, stated(1e-6));
@@ -135,8 +136,10 @@ TEST(SmoothnessPrior, ReducesTheErrorAndItsUncertaintyAlike) {
     EXPECT_EQ(with->solution.smoothness->left_out(), 0u);
     EXPECT_LT(with->solution.statistics.rank, without->solution.statistics.rank);
   }
-  EXPECT_LT(with_m2, std::pow(0.9, 2) * without_m2);
-  EXPECT_NEAR(normalised, 1.0, 0.1);
+  if (abbe::tests::kAllRepetitions) {
+    EXPECT_LT(with_m2, std::pow(0.9, 2) * without_m2);
+    EXPECT_NEAR(normalised, 1.0, 0.1);
+  }
 }
 
 /// With three times the stated noise the covariance is multiplied with nine, the prior is not.

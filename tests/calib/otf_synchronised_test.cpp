@@ -2,14 +2,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
 #include "abbe/calib/otf/judge/judge.hpp"
 #include "encoder_run.hpp"
 #include "normalised_error.hpp"
+#include "repetitions.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -93,11 +96,26 @@ TEST_P(CaseB, WithoutReadingsHasTheErrorOfThePrototype) {
 }
 
 /// A run with scale readings of a machine whose clock is 0.25 s ahead.
+EncoderRun encoder_run(unsigned seed, Estimator estimator) {
+  EncoderRun run = make_encoder_run({.seed = seed});
+  run.run.options.estimator = estimator;
+  return run;
+}
+
+/// Of encoder_run(); each is identified once.
+const Result<Identification>& identified_with_readings(unsigned seed, Estimator estimator) {
+  static std::map<std::pair<unsigned, Estimator>, Result<Identification>> found;
+  const std::pair key(seed, estimator);
+  if (const auto one = found.find(key); one != found.end()) {
+    return one->second;
+  }
+  return found.emplace(key, identify_with_readings(encoder_run(seed, estimator))).first->second;
+}
+
 TEST(SynchronisedEstimate, FindsTheClock) {
   for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
-    EncoderRun run = make_encoder_run({});
-    run.run.options.estimator = estimator;
-    const auto id = identify_with_readings(run);
+    const EncoderRun run = encoder_run(1, estimator);
+    const auto& id = identified_with_readings(1, estimator);
     ASSERT_TRUE(id) << id.error().text;
     ASSERT_TRUE(id->solution.synchronisation);
     const Synchronisation& s = *id->solution.synchronisation;
@@ -112,9 +130,8 @@ TEST(SynchronisedEstimate, FindsTheClock) {
 TEST(SynchronisedEstimate, TakesTimesSince1970) {
   constexpr double kSince1970_s = 1.7e9;
   for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
-    EncoderRun run = make_encoder_run({});
-    run.run.options.estimator = estimator;
-    const auto wanted = identify_with_readings(run);
+    const EncoderRun run = encoder_run(1, estimator);
+    const auto& wanted = identified_with_readings(1, estimator);
     ASSERT_TRUE(wanted) << wanted.error().text;
     for (const bool tracker_too : {false, true}) {
       EncoderRun later = run;
@@ -142,21 +159,24 @@ TEST(SynchronisedEstimate, TakesTimesSince1970) {
 /// Eight runs of 31 combinations each: standard deviation of the mean 0.09.
 TEST(SynchronisedEstimate, StatesAnHonestUncertainty) {
   double of_tables = 0.0, of_clock = 0.0;
-  constexpr unsigned kRuns = 8;
+  constexpr unsigned kRuns = abbe::tests::repetitions(8u);
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
-    EncoderRun run = make_encoder_run({.seed = seed});
-    run.run.options.estimator = Estimator::Joint;
-    const auto id = identify_with_readings(run);
+    const EncoderRun run = encoder_run(seed, Estimator::Joint);
+    const auto& id = identified_with_readings(seed, Estimator::Joint);
     ASSERT_TRUE(id) << id.error().text;
     ASSERT_TRUE(id->solution.synchronisation);
     const Synchronisation& s = *id->solution.synchronisation;
+    EXPECT_GT(s.u_offset_s, 0.0);
+    EXPECT_GT(s.u_drift, 0.0);
     of_clock += std::pow((s.clock.offset_s - run.clock.offset_s) / s.u_offset_s, 2);
     of_clock += std::pow((s.clock.drift - run.clock.drift) / s.u_drift, 2);
     of_tables += normalised_error_square(run.run, id->solution.model) / kRuns;
   }
   RecordProperty("mean_squared_normalised_error", std::to_string(of_tables));
-  EXPECT_NEAR(of_tables, 1.0, 0.25);
-  EXPECT_NEAR(of_clock / (2.0 * kRuns), 1.0, 1.0);  // 16 squares: standard deviation 0.35
+  if (abbe::tests::kAllRepetitions) {
+    EXPECT_NEAR(of_tables, 1.0, 0.25);
+    EXPECT_NEAR(of_clock / (2.0 * kRuns), 1.0, 1.0);  // 16 squares: standard deviation 0.35
+  }
 }
 
 /// Noise of 1 s in all components: the rows along the travel are as good as those across it.
@@ -182,9 +202,8 @@ TEST(SynchronisedEstimate, DoesNotTakeCorrelatedNoiseForErrorsOfTheReadings) {
 }
 
 TEST(SynchronisedEstimate, IsAcceptedByTheGate) {
-  EncoderRun run = make_encoder_run({.seed = 3});
-  run.run.options.estimator = Estimator::Joint;
-  const auto id = identify_with_readings(run);
+  const EncoderRun run = encoder_run(3, Estimator::Joint);
+  const auto& id = identified_with_readings(3, Estimator::Joint);
   ASSERT_TRUE(id) << id.error().text;
   const auto verdict = judge(id->observations, id->solution, nullptr, {}, run.run.options);
   ASSERT_TRUE(verdict) << verdict.error().text;
@@ -200,7 +219,7 @@ double mean_error_m(const MadeRun& run, const VolumetricModel& model) {
 /// Known clock, 10 us of jitter at 0.1 m/s: 1 um along the travel.
 TEST(SynchronisedEstimate, OfATriggerLineHasASmallerError) {
   double across_m2 = 0.0, all_m2 = 0.0;
-  for (unsigned seed = 1; seed <= 4; ++seed) {
+  for (unsigned seed = 1; seed <= abbe::tests::repetitions(4u); ++seed) {
     EncoderRun run = make_encoder_run(
         {.seed = seed, .sigma_time_s = 10e-6, .stated_sigma_time_s = 10e-6, .speed_m_s = 0.1});
     run.run.options.estimator = Estimator::Joint;
@@ -217,7 +236,9 @@ TEST(SynchronisedEstimate, OfATriggerLineHasASmallerError) {
   }
   const double ratio = std::sqrt(all_m2 / across_m2);
   RecordProperty("error_relative_to_the_run_without", std::to_string(ratio));
-  EXPECT_LT(ratio, 0.9);
+  if (abbe::tests::kAllRepetitions) {
+    EXPECT_LT(ratio, 0.9);
+  }
 }
 
 }  // namespace

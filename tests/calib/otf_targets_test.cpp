@@ -7,7 +7,9 @@
 #include <array>
 #include <cmath>
 #include <iostream>
+#include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,22 +17,27 @@
 #include "nest_run.hpp"
 #include "normalised_error.hpp"
 #include "otf_run.hpp"
+#include "repetitions.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
+using abbe::tests::kAllRepetitions;
+using abbe::tests::repetitions;
 using testing::HasSubstr;
 using testing::Not;
 
 const std::vector<Vector3> kThreeRunTargets{
     {0.02, -0.015, -0.12}, {0.17, -0.015, -0.12}, {0.02, 0.135, -0.17}};
 
+constexpr const char* kUsualChain = "[w X' b Y Z (C1) t]";
+
 struct MadeTargetsOptions {
   unsigned seed = 1;
   double noise_factor = 1.0, error_scale_m = 10e-6;
   std::array<double, 3> range_offset_m{};  ///< of each run
-  std::string chain = "[w X' b Y Z (C1) t]";
+  std::string chain = kUsualChain;
   Interpolation interpolation = Interpolation::Linear;
   std::vector<Vector3> targets_m = kThreeRunTargets;
   /// Runs of some 1000 s from one place of the tracker, which drifts to the other side in the
@@ -120,11 +127,35 @@ Result<TargetsIdentification> identified_targets(const MadeTargets& made) {
   return identify_targets(made.runs, made.machine, made.noise, made.options);
 }
 
+/// Exact samples.
+MadeTargets exact_targets(const std::string& chain) {
+  MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6, .chain = chain});
+  made.options.estimator = Estimator::Joint;
+  return made;
+}
+
+/// Of exact_targets(), each chain identified once.
+const Result<TargetsIdentification>& identified_exactly(const std::string& chain) {
+  static std::map<std::string, Result<TargetsIdentification>> found;
+  if (const auto one = found.find(chain); one != found.end()) {
+    return one->second;
+  }
+  return found.emplace(chain, identified_targets(exact_targets(chain))).first->second;
+}
+
+/// Of the runs with the usual noise, each machine identified once.
+const Result<TargetsIdentification>& identified_usual(unsigned seed) {
+  static std::map<unsigned, Result<TargetsIdentification>> found;
+  if (const auto one = found.find(seed); one != found.end()) {
+    return one->second;
+  }
+  return found.emplace(seed, identified_targets(make_targets({.seed = seed}))).first->second;
+}
+
 TEST(SeveralTargets, DetermineAll18TablesFromExactSamples) {
-  for (const char* chain : {"[w X' b Y Z (C1) t]", "[w b Z X Y (C1) t]"}) {
-    MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6, .chain = chain});
-    made.options.estimator = Estimator::Joint;
-    const auto found = identified_targets(made);
+  for (const char* chain : {kUsualChain, "[w b Z X Y (C1) t]"}) {
+    const MadeTargets made = exact_targets(chain);
+    const auto& found = identified_exactly(chain);
     ASSERT_TRUE(found) << found.error().text;
     EXPECT_EQ(found->statistics.unknowns - found->statistics.rank, 24u);
     EXPECT_EQ(found->statistics.gauge_conditions, 24u);
@@ -133,9 +164,8 @@ TEST(SeveralTargets, DetermineAll18TablesFromExactSamples) {
 }
 
 TEST(SeveralTargets, GiveAModelForAToolThatWasNotMeasured) {
-  MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6});
-  made.options.estimator = Estimator::Joint;
-  const auto found = identified_targets(made);
+  const MadeTargets made = exact_targets(kUsualChain);
+  const auto& found = identified_exactly(kUsualChain);
   ASSERT_TRUE(found) << found.error().text;
   const Vector3 other(-0.2, 0.3, 0.1);
   EXPECT_TRUE(found->model().holds_for_tool(other));
@@ -185,17 +215,19 @@ struct ChiSquareOfErrors {
 
 TEST(SeveralTargets, HaveTheErrorsThatTheyState) {
   ChiSquareOfErrors all;
-  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+  for (unsigned seed = 1; seed <= repetitions(4u); ++seed) {
     const MadeTargets made = make_targets({.seed = seed});
-    const auto found = identified_targets(made);
+    const auto& found = identified_usual(seed);
     ASSERT_TRUE(found) << found.error().text;
     EXPECT_NEAR(found->statistics.sigma0, 1.0, 0.05);
     all.add(found->model(), made.truth);
   }
 
   // chi-square of n combinations: mean 1 after division by n, standard deviation sqrt(2 / n)
-  EXPECT_GT(all.combinations, 150.0);
-  EXPECT_NEAR(all.squares / all.combinations, 1.0, 3.0 * std::sqrt(2.0 / all.combinations));
+  EXPECT_GT(all.combinations, kAllRepetitions ? 150.0 : 75.0);
+  if (kAllRepetitions) {
+    EXPECT_NEAR(all.squares / all.combinations, 1.0, 3.0 * std::sqrt(2.0 / all.combinations));
+  }
 }
 
 /// Mean error of V for the three targets on the grid of the nodes, rigid motions removed.
@@ -296,13 +328,15 @@ TEST(SeveralTargets, EstimateTheOffsetOfTheRangesOfEachRun) {
   }
 }
 
+constexpr std::array<std::array<double, 3>, 4> kHomedAgain_m{
+    {{9e-6, -6e-6, -3e-6}, {-2e-6, 10e-6, -8e-6}, {6e-6, 5e-6, -10e-6}, {-7e-6, -5e-6, 8e-6}}};
+
 /// The tracker is homed again before each run: offsets of 7 um rms where 6 um are stated.
 TEST(SeveralTargets, HaveTheErrorsThatTheyStateWhenTheTrackerWasHomedAgain) {
   ChiSquareOfErrors all;
   unsigned seed = 0;
   for (const std::array<double, 3>& of_runs_m :
-       {std::array{9e-6, -6e-6, -3e-6}, std::array{-2e-6, 10e-6, -8e-6},
-        std::array{6e-6, 5e-6, -10e-6}, std::array{-7e-6, -5e-6, 8e-6}}) {
+       std::span(kHomedAgain_m).first(repetitions(kHomedAgain_m.size()))) {
     MadeTargets made =
         make_targets({.seed = ++seed, .error_scale_m = 30e-6, .range_offset_m = of_runs_m});
     made.noise.u_range_offset_m = 6e-6;
@@ -314,7 +348,10 @@ TEST(SeveralTargets, HaveTheErrorsThatTheyStateWhenTheTrackerWasHomedAgain) {
     EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
   }
   std::cout << "mean squared normalised error " << all.squares / all.combinations << "\n";
-  EXPECT_NEAR(all.squares / all.combinations, 1.0, 3.0 * std::sqrt(2.0 / all.combinations));
+  EXPECT_GT(all.combinations, 0.0);
+  if (kAllRepetitions) {
+    EXPECT_NEAR(all.squares / all.combinations, 1.0, 3.0 * std::sqrt(2.0 / all.combinations));
+  }
 }
 
 /// With reference nests, each run has an offset beside its drift, too.
@@ -330,7 +367,7 @@ TEST(SeveralTargets, EstimateTheOffsetOfEachRunBesideItsDrift) {
 
 TEST(SeveralTargets, StateTheUncertaintyOfScalesOnceForAllRuns) {
   MadeTargets made = make_targets({});
-  const auto without = identified_targets(made);
+  const auto& without = identified_usual(1);
   made.noise.u_scale = 1e-6;
   made.noise.u_axis_scale = {0.0, 2e-6, 0.0};
   const auto with = identified_targets(made);
@@ -415,7 +452,7 @@ TEST(SeveralTargets, NameTheRunThatDoesNotFitItsPath) {
 /// Tables of 10 um at nodes 200 mm apart: their bends are 24 um, (200 / 50)^1.5 = 8 times the size.
 TEST(SeveralTargets, HaveOnePriorForSmoothTables) {
   MadeTargets made = make_targets({});
-  const auto without = identified_targets(made);
+  const auto& without = identified_usual(1);
   made.options.smoothness = SmoothnessOptions{.bend_m = {3e-6, 3e-6, 3e-6}};
   const auto with = identified_targets(made);
   ASSERT_TRUE(without && with) << with.error().text;

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "abbe/calib/mfb/run/points_of_interest.hpp"
+#include "repetitions.hpp"
 #include "simulated_bar.hpp"
 
 namespace abbe::tests::mfb {
@@ -148,7 +150,7 @@ TEST(BarCalibration, AGaugeThatIsNotAlongTheBarIsRefusedOrInTheUncertainty) {
 /// The true x of every hole, over gauges whose direction is random, as are plan, bar and way of the
 /// tip.
 TEST(BarCalibration, UncertaintyOfTheGaugeIsTrue) {
-  constexpr std::uint64_t kGauges = 500;
+  constexpr std::uint64_t kGauges = repetitions(std::uint64_t{500});
   constexpr std::size_t kHoles = 6;
   using sim::mfb::GaugeTravel;
   std::size_t inside = 0, all = 0, refused = 0;
@@ -175,13 +177,17 @@ TEST(BarCalibration, UncertaintyOfTheGaugeIsTrue) {
     }
     for (std::size_t i = 1; i < kHoles; ++i, ++all) {
       const double off_m = found->bar.O_m[i].x() - s.truth_m[i].x();
+      EXPECT_GT(found->u_m[i].x(), 0.0) << seed;
       inside += std::abs(off_m) <= 2.0 * found->u_m[i].x() ? 1 : 0;
     }
   }
-  EXPECT_LT(refused, kGauges / 50);  // 1 % of those that are touched along the gauge
-  const double part = static_cast<double>(inside) / static_cast<double>(all);
-  EXPECT_GT(part, 0.90);
-  EXPECT_LT(part, 0.99);
+  EXPECT_GT(all, 0u);
+  if (kAllRepetitions) {
+    EXPECT_LT(refused, kGauges / 50);  // 1 % of those that are touched along the gauge
+    const double part = static_cast<double>(inside) / static_cast<double>(all);
+    EXPECT_GT(part, 0.90);
+    EXPECT_LT(part, 0.99);
+  }
 }
 
 TEST(BarCalibration, GrowthIsTakenOut) {
@@ -215,15 +221,18 @@ struct Coverage {
 
 TEST(BarCalibration, IntervalsOfStudentHold) {
   // Measured with 200 seeds: rms 0.074 um in y and z, coverage 95.4 %.
-  constexpr std::uint64_t kSeeds = 12;
+  constexpr std::uint64_t kSeeds = repetitions(std::uint64_t{12});
   Coverage coverage;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const Simulated s = simulated(usual(seed));
     coverage.add(s, calibrated(s));
   }
-  EXPECT_LT(coverage.rms_yz_um(), 0.11);  // 0.10 with many seeds; 12 seeds scatter by 6 %
-  EXPECT_GT(coverage.rms_yz_um(), 0.05);
-  EXPECT_NEAR(static_cast<double>(coverage.inside_yz) / coverage.yz, 0.95, 0.05);
+  EXPECT_GT(coverage.yz, 0);
+  EXPECT_LT(coverage.rms_yz_um(), kAllRepetitions ? 0.11 : 1.0);
+  if (kAllRepetitions) {
+    EXPECT_GT(coverage.rms_yz_um(), 0.05);  // 0.10 with many seeds; 12 seeds scatter by 6 %
+    EXPECT_NEAR(static_cast<double>(coverage.inside_yz) / coverage.yz, 0.95, 0.05);
+  }
 }
 
 TEST(BarCalibration, GaugeBesideTheBarIsNoticedAndBudgeted) {
@@ -263,7 +272,7 @@ TEST(BarCalibration, CovarianceContainsWhatIsCommon) {
 TEST(BarCalibration, MeanOfThePointsIsAsUncertainAsStated) {
   double squares = 0.0, squares_if_independent = 0.0;
   int count = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 1; seed <= repetitions(std::uint64_t{40}); ++seed) {
     const Simulated s = simulated(usual(seed));
     const BarCalibration found = calibrated(s);
     const Eigen::MatrixXd& C = found.bar.covariance_m2;
@@ -275,14 +284,18 @@ TEST(BarCalibration, MeanOfThePointsIsAsUncertainAsStated) {
         all(3 * static_cast<Eigen::Index>(i) + k) = 1.0;
         off_m += found.bar.O_m[i](k) - s.truth_m[i](k);
       }
-      squares += std::pow(factor * off_m, 2) / all.dot(C * all);
+      const double normalised = std::pow(factor * off_m, 2) / all.dot(C * all);
+      EXPECT_TRUE(std::isfinite(normalised)) << seed;
+      squares += normalised;
       squares_if_independent +=
           std::pow(factor * off_m, 2) / all.dot(C.diagonal().asDiagonal() * all);
       ++count;
     }
   }
-  EXPECT_NEAR(std::sqrt(squares / count), 1.0, 0.25);
-  EXPECT_GT(std::sqrt(squares_if_independent / count), 1.5);
+  if (kAllRepetitions) {
+    EXPECT_NEAR(std::sqrt(squares / count), 1.0, 0.25);
+    EXPECT_GT(std::sqrt(squares_if_independent / count), 1.5);
+  }
 }
 
 TEST(BarCalibration, TurnedBarIsRefusedByPass) {

@@ -35,6 +35,8 @@ class CliBacklash : public ::testing::Test {
     folder_ = fs::path(::testing::TempDir()) / fmt::format("cli_backlash_{}", ::getpid());
     const auto files = test::write_synthetic_run(folder_);
     test::write_text(files.tracker, test::synthetic_tracker_csv(truth_with_backlash()));
+    with_ = identify("--backlash", "with");
+    plain_ = identify("--backlash=none", "plain");
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
@@ -47,6 +49,7 @@ class CliBacklash : public ::testing::Test {
   static std::string text_of(const std::string& file) { return test::text_of(folder_ / file); }
 
   static inline fs::path folder_;
+  static inline test::Ran with_, plain_;  ///< in the folders "with" and "plain"
 };
 
 /// Without noise the values are those of the machine within the second order, 0.1 um.
@@ -67,14 +70,13 @@ TEST_F(CliBacklash, PrintsTheValueOfEveryTable) {
 }
 
 TEST_F(CliBacklash, IsInSummaryVerdictAndFiles) {
-  const auto ran = identify("--backlash");
-  ASSERT_EQ(ran.exit, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("backlash    EXX 4.0"));
-  EXPECT_THAT(ran.out,
+  ASSERT_EQ(with_.exit, 0) << with_.err;
+  EXPECT_THAT(with_.out, HasSubstr("backlash    EXX 4.0"));
+  EXPECT_THAT(with_.out,
               ContainsRegex("backlash, forward minus backward: EXX [34]\\.[0-9]+ um, EAY -"));
-  EXPECT_THAT(text_of("out/tables.csv"), HasSubstr("\nEXX.backlash,,"));
-  EXPECT_THAT(text_of("out/report.html"), HasSubstr("Backlash"));
-  const auto document = read_model(folder_ / "out/model.json");
+  EXPECT_THAT(text_of("with/tables.csv"), HasSubstr("\nEXX.backlash,,"));
+  EXPECT_THAT(text_of("with/report.html"), HasSubstr("Backlash"));
+  const auto document = read_model(folder_ / "with/model.json");
   ASSERT_TRUE(document);
   EXPECT_EQ(document->backlash.size(), 14u);
 }
@@ -85,11 +87,11 @@ double value_of(const test::Ran& ran, std::size_t column) {
 }
 
 TEST_F(CliBacklash, IsInVOfADirection) {
-  ASSERT_EQ(identify("--backlash").exit, 0);
+  ASSERT_EQ(with_.exit, 0);
   test::write_text(folder_ / "point.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
   test::write_text(folder_ / "back.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n10,20,-30,-,0,0\n");
   const auto eval = [](const std::string& more) {
-    return test::run_abbe(folder_, "model eval out/model.json --points " + more);
+    return test::run_abbe(folder_, "model eval with/model.json --points " + more);
   };
   constexpr std::size_t kEx = 3, kUx = 6;
   const auto mean = eval("point.csv"), forth = eval("point.csv --direction +,0,0"),
@@ -101,16 +103,16 @@ TEST_F(CliBacklash, IsInVOfADirection) {
 }
 
 TEST_F(CliBacklash, DirectionIsRefusedWhereItHasNoMeaning) {
-  ASSERT_EQ(identify("--backlash").exit, 0);
-  ASSERT_EQ(identify("--backlash=none", "plain").exit, 5);  // refused, but written
+  ASSERT_EQ(with_.exit, 0);
+  ASSERT_EQ(plain_.exit, 5);  // refused, but written
   test::write_text(folder_ / "point.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
   test::write_text(folder_ / "back.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n10,20,-30,-,0,0\n");
   const auto error = [](const std::string& more) {
     return test::run_abbe(folder_, "model " + more).err;
   };
-  EXPECT_THAT(error("eval out/model.json --points point.csv --direction +,1,0"),
+  EXPECT_THAT(error("eval with/model.json --points point.csv --direction +,1,0"),
               HasSubstr("--direction \"+,1,0\": must be three of +, -, 0"));
-  EXPECT_THAT(error("eval out/model.json --points back.csv --direction +,+,+"),
+  EXPECT_THAT(error("eval with/model.json --points back.csv --direction +,+,+"),
               HasSubstr("back.csv has the columns dx, dy, dz"));
   EXPECT_THAT(error("eval plain/model.json --points back.csv"),
               HasSubstr("plain/model.json: the model has no backlash"));
@@ -119,15 +121,15 @@ TEST_F(CliBacklash, DirectionIsRefusedWhereItHasNoMeaning) {
 }
 
 TEST_F(CliBacklash, IsShownAndCompared) {
-  ASSERT_EQ(identify("--backlash").exit, 0);
-  EXPECT_THAT(test::run_abbe(folder_, "model show out/model.json").out,
+  ASSERT_EQ(with_.exit, 0);
+  EXPECT_THAT(test::run_abbe(folder_, "model show with/model.json").out,
               HasSubstr("V depends on the direction of travel (per-table)"));
   const auto compared = [](const std::string& more) {
     return nlohmann::json::parse(
-        test::run_abbe(folder_, "model compare out/model.json plain/model.json --json " + more)
+        test::run_abbe(folder_, "model compare with/model.json plain/model.json --json " + more)
             .out);
   };
-  ASSERT_EQ(identify("--backlash=none", "plain").exit, 5);  // refused, but written
+  ASSERT_EQ(plain_.exit, 5);  // refused, but written
   const auto mean = compared(""), forth = compared("--direction +,+,+");
   EXPECT_GT(forth.at("as_stated").at("mean_um").get<double>(),
             mean.at("as_stated").at("mean_um").get<double>() + 1.0);

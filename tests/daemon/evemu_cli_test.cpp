@@ -54,8 +54,9 @@ std::string calibrator_toml() {
 using Touches = std::vector<calib::evemu::Touch>;
 using calib::evemu::Feature;
 
-Touches touches() {
-  return tests::evemu::reference_touches("touched_sig3um.csv");
+const Touches& touches() {
+  static const Touches all = tests::evemu::reference_touches("touched_sig3um.csv");
+  return all;
 }
 
 std::string touches_csv(const Touches& all = touches()) {
@@ -82,14 +83,28 @@ constexpr int kRefused = 5;
 
 class EvemuCli : public ::testing::Test {
  protected:
-  void SetUp() override {
-    fs::create_directories(folder_);
-    write("machine.toml", to_toml(config_tables::weak_portal()));
-    write("calibrator.toml", calibrator_toml());
-    write("touches.csv", touches_csv());
-    write("errors.csv", errors_csv());
-  }
+  static void SetUpTestSuite() { write_files(shared_); }
+  static void TearDownTestSuite() { fs::remove_all(shared_); }
+  void SetUp() override { write_files(folder_); }
   void TearDown() override { fs::remove_all(folder_); }
+
+  static void write_files(const fs::path& folder) {
+    static const std::string calibrator = calibrator_toml(), touched = touches_csv(),
+                             errors = errors_csv();
+    fs::create_directories(folder);
+    test::write_text(folder / "machine.toml", to_toml(config_tables::weak_portal()));
+    test::write_text(folder / "calibrator.toml", calibrator);
+    test::write_text(folder / "touches.csv", touched);
+    test::write_text(folder / "errors.csv", errors);
+  }
+  /// From the unchanged touches, identified once, in shared_ / "kept_out".
+  static const Ran& from_touches() {
+    static const Ran ran =
+        test::run_abbe(shared_, std::string("identify evemu --machine machine.toml --touches "
+                                            "touches.csv --calibrator calibrator.toml ") +
+                                    test::kKept);
+    return ran;
+  }
 
   fs::path write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name, std::ios::binary) << text;
@@ -110,23 +125,21 @@ class EvemuCli : public ::testing::Test {
     EXPECT_FALSE(fs::exists(folder_ / "out"));
   }
 
+  static inline const fs::path shared_ =
+      fs::path(::testing::TempDir()) / fmt::format("evemu_cli_shared_{}", ::getpid());
   fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("evemu_cli_{}", ::getpid());
 };
 
 TEST_F(EvemuCli, IdentifiesFromTouchesAndReportsShapeOnly) {
-  const auto ran = abbe(
-      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml "
-      "--json -o "
-      "out");
-  ASSERT_EQ(ran.exit, kRefused) << ran.err;
-  const auto summary = nlohmann::json::parse(ran.out);
+  ASSERT_EQ(from_touches().exit, kRefused) << from_touches().err;
+  const auto summary = nlohmann::json::parse(from_touches().out);
 
   EXPECT_EQ(summary["balls"], 72);
   EXPECT_EQ(summary["shape_only"], true);
   EXPECT_EQ(summary["gate"]["accepted"], false);
   EXPECT_LT(summary["held_out_rms_after_um"].get<double>(),
             0.1 * summary["held_out_rms_before_um"].get<double>());
-  EXPECT_THAT(text_of(folder_ / "out/coefficients.csv"),
+  EXPECT_THAT(text_of(shared_ / "kept_out/coefficients.csv"),
               AllOf(StartsWith("name,value,u,unit\nk_dxx1,"), HasSubstr("\nk_ezz3,"),
                     HasSubstr(",rad/mm^3\n")));
 }
@@ -158,6 +171,13 @@ TEST_F(EvemuCli, EvaluatesWhatItIdentified) {
   EXPECT_THAT(line, ::testing::EndsWith(",0"));
 }
 
+void expect_same_bits_again(const fs::path& file) {
+  const auto text = text_of(file);
+  const auto document = parse_model(text, "model.json");
+  ASSERT_TRUE(document) << document.error().details.front();
+  EXPECT_EQ(to_json(*document), text);
+}
+
 TEST_F(EvemuCli, KeepsNoModelWhoseReportCannotBeWritten) {
   fs::create_directories(folder_ / "out/report.html");  // a folder in place of the file
   const std::string identify =
@@ -168,15 +188,12 @@ TEST_F(EvemuCli, KeepsNoModelWhoseReportCannotBeWritten) {
   EXPECT_TRUE(ModelStore::open(folder_ / "kept")->list()->empty());
   EXPECT_EQ(abbe(identify + "other").exit, kRefused);
   EXPECT_EQ(ModelStore::open(folder_ / "kept")->list()->size(), 1u);
+  expect_same_bits_again(folder_ / "other/model.json");
 }
 
 TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
-  ASSERT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit,
-            kRefused);
-  const auto text = text_of(folder_ / "out/model.json");
-  const auto document = parse_model(text, "model.json");
-  ASSERT_TRUE(document) << document.error().details.front();
-  EXPECT_EQ(to_json(*document), text);
+  ASSERT_EQ(from_touches().exit, kRefused);
+  expect_same_bits_again(shared_ / "kept_out/model.json");
 }
 
 TEST_F(EvemuCli, ReportsThatFilesHoldNoTemperaturesOfScales) {
@@ -435,8 +452,8 @@ TEST_F(EvemuCli, AcceptsShapeOnlyWhenTheConfigurationNamesIt) {
 }
 
 TEST_F(EvemuCli, ExplainsInItsReportWhatIsNotEstimable) {
-  ASSERT_EQ(identify(touches()).exit, kRefused);
-  const auto page = text_of(folder_ / "out/report.html");
+  ASSERT_EQ(from_touches().exit, kRefused);
+  const auto page = text_of(shared_ / "kept_out/report.html");
   EXPECT_THAT(page,
               AllOf(HasSubstr("rotation that touches do not determine"), HasSubstr("shape only"),
                     HasSubstr("Rotations of the positions"), HasSubstr("k_ezz3")));
@@ -444,11 +461,8 @@ TEST_F(EvemuCli, ExplainsInItsReportWhatIsNotEstimable) {
 }
 
 TEST_F(EvemuCli, TheReportOfAKeptModelIsMadeAgainFromTheStore) {
-  write("touches.csv", touches_csv());
-  const std::string page = test::expect_same_report_from_store(
-      folder_,
-      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml");
-  const auto document = read_model(folder_ / "kept_out/model.json");
+  const std::string page = test::expect_same_report_from_store(shared_, from_touches());
+  const auto document = read_model(shared_ / "kept_out/model.json");
   ASSERT_TRUE(document && document->run);
   const auto& parts = document->run->parts;
   ASSERT_EQ(parts.size(), 8u);

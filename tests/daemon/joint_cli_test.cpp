@@ -149,7 +149,10 @@ class JointCli : public ::testing::Test {
     write("touches.csv", joint_touches_csv(touches));
     write("calibrator.toml", calibrator_toml(joint_array(), {}, ""));
     array_ = *calib::evemu::observe(touches, joint_array(), {made_.machine.chain, kJointTip_m});
-    agreed_ = identify(kFrontRun + kBehindRun + kTouchedArray, "out", "--json");
+    write("parts.toml", kFrontRun + kBehindRun + kTouchedArray);
+    agreed_ = test::run_abbe(folder_, fmt::format("identify joint --machine machine.toml --parts "
+                                                  "parts.toml {}",
+                                                  test::kKept));
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
@@ -210,23 +213,21 @@ TEST_F(JointCli, PartsThatAgreeGiveAModelThatIsNowhereLessCertain) {
     for (const auto& u_of_run : table["u_of_runs"])
       EXPECT_LE(table["u"].get<double>(), u_of_run.get<double>() * (1.0 + 1e-9));
   EXPECT_THAT(
-      text_of(folder_ / "out/report.html"),
+      text_of(folder_ / "kept_out/report.html"),
       AllOf(HasSubstr("Do the parts agree?"), HasSubstr("scale of X, um/m"), HasSubstr("behind"),
             Not(HasSubstr("src=")), HasSubstr("no residuals of its own"),
             Not(HasSubstr("before the fit")), HasSubstr("error at legs excluded from the fit")));
 }
 
 TEST_F(JointCli, TheReportOfAKeptModelIsMadeAgainFromTheStore) {
-  write("again.toml", kFrontRun + kBehindRun + kTouchedArray);
-  const std::string page = test::expect_same_report_from_store(
-      folder_, "identify joint --machine machine.toml --parts again.toml");
+  const std::string page = test::expect_same_report_from_store(folder_, agreed_);
   EXPECT_THAT(
       page, AllOf(HasSubstr("Do the parts agree?"), HasSubstr("Standard uncertainty of each table"),
                   Not(HasSubstr("<script"))));
 }
 
 TEST_F(JointCli, TheModelHasTheErrorsOfTheMachine) {
-  const auto document = read_model(folder_ / "out/model.json");
+  const auto document = read_model(folder_ / "kept_out/model.json");
   ASSERT_TRUE(document) << document.error().text;
   EXPECT_EQ(document->method, "joint");
   EXPECT_EQ(document->inputs.size(), 7u);
@@ -257,7 +258,7 @@ TEST_F(JointCli, GivesTheResultOfTheLibrary) {
   const auto result = joint::identify(parts, *common);
   ASSERT_TRUE(result && result->joint);
 
-  const auto document = read_model(folder_ / "out/model.json");
+  const auto document = read_model(folder_ / "kept_out/model.json");
   ASSERT_TRUE(document);
   const auto& model = result->joint->model;
   // The files contain decimal numbers in mm: rounding of 1e-16 of 1 m.

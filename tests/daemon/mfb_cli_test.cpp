@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -131,7 +132,30 @@ Vector3 V_um_at_100_200_300(const std::map<std::string, TableRow>& tables, const
                                   -squareness("EA0Z") * 300, 0);
 }
 
-using MfbCli = test::MfbFolder;
+class MfbCli : public test::MfbFolder {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = std::make_unique<TemporaryFolder>();
+    write_reference_files(shared_->path());
+    identified_ = test::run_abbe(shared_->path(), std::string("identify mfb --machine machine.toml "
+                                                              "--bar bar.toml --plan plan.toml "
+                                                              "--points points.csv ") +
+                                                      test::kKept);
+  }
+  static void TearDownTestSuite() { shared_.reset(); }
+
+  /// A file of the shared identification.
+  static std::filesystem::path shared(const std::string& name) {
+    return shared_->path() / "kept_out" / name;
+  }
+  /// `abbe` in the folder of the shared identification.
+  static test::Ran abbe_shared(const std::string& arguments) {
+    return test::run_abbe(shared_->path(), arguments);
+  }
+
+  static inline std::unique_ptr<TemporaryFolder> shared_;
+  static inline test::Ran identified_;  ///< from the unchanged files, once
+};
 
 /// The reference was linearised at the planned poses, abbe at the poses found, up to 0.14 mm beside
 /// them. At 0.1 mm and 0.3 mrad this moves the errors by 0.02 um and 0.05 urad; a
@@ -139,9 +163,8 @@ using MfbCli = test::MfbFolder;
 constexpr double kPose_um = 0.03, kPose_urad = 0.1;
 
 TEST_F(MfbCli, FindsTheErrorsOfTheReferenceFromItsTouches) {
-  const auto ran = abbe(kIdentifyMfb);
-  ASSERT_EQ(ran.exit, 0) << ran.err << ran.out;
-  const auto tables = tables_in(out("tables.csv"));
+  ASSERT_EQ(identified_.exit, 0) << identified_.err << identified_.out;
+  const auto tables = tables_in(shared("tables.csv"));
   const auto& reference = test::reference_case("full");
   const auto& names = reference.at("params");
   ASSERT_THAT(names, SizeIs(195));
@@ -180,9 +203,8 @@ TEST_F(MfbCli, FollowsThePublishedSequenceOnRequest) {
 }
 
 TEST_F(MfbCli, SummarisesWhatItFound) {
-  const auto ran = abbe(kIdentifyMfb);
-  ASSERT_EQ(ran.exit, 0) << ran.err;
-  const auto summary = nlohmann::json::parse(ran.out);
+  ASSERT_EQ(identified_.exit, 0) << identified_.err;
+  const auto summary = nlohmann::json::parse(identified_.out);
   EXPECT_EQ(summary["positions"], 14);
   EXPECT_EQ(summary["touches"], 17 * 316);
   EXPECT_THAT(summary["measurements"], SizeIs(17));
@@ -195,19 +217,20 @@ TEST_F(MfbCli, SummarisesWhatItFound) {
 }
 
 TEST_F(MfbCli, WritesAModelThatEveryToolMayUse) {
-  ASSERT_EQ(abbe(kIdentifyMfb).exit, 0);
-  const auto document = read_model(out("model.json"));
+  ASSERT_EQ(identified_.exit, 0);
+  const auto document = read_model(shared("model.json"));
   ASSERT_TRUE(document) << document.error().text;
   EXPECT_EQ(document->method, "mfb");
   EXPECT_EQ(document->model.tables()->layout().tables().size(), 18u);
-  EXPECT_EQ(to_json(*document), test::text_of(out("model.json")));
+  EXPECT_EQ(to_json(*document), test::text_of(shared("model.json")));
   EXPECT_THAT(document->bar->passes, SizeIs(17));
 
-  write("at.csv", "x_mm,y_mm,z_mm\n100,200,300\n");
-  const auto tables = tables_in(out("tables.csv"));
+  test::write_text(shared_->path() / "at.csv", "x_mm,y_mm,z_mm\n100,200,300\n");
+  const auto tables = tables_in(shared("tables.csv"));
   for (const Vector3& t_mm : {Vector3(0, 0, -150), Vector3(30, -20, -90)}) {
-    const auto eval = abbe(fmt::format("model eval out/model.json --points at.csv --tool={},{},{}",
-                                       t_mm.x(), t_mm.y(), t_mm.z()));
+    const auto eval =
+        abbe_shared(fmt::format("model eval kept_out/model.json --points at.csv --tool={},{},{}",
+                                t_mm.x(), t_mm.y(), t_mm.z()));
     ASSERT_EQ(eval.exit, 0) << eval.err;
     const auto row = test::rows_of(eval.out).at(0);
     const Vector3 V_um = V_um_at_100_200_300(tables, t_mm);
@@ -215,10 +238,10 @@ TEST_F(MfbCli, WritesAModelThatEveryToolMayUse) {
       EXPECT_NEAR(row.at(3 + c), V_um(static_cast<Eigen::Index>(c)), 1e-6) << eval.out;
     EXPECT_EQ(row.back(), 1.0) << "inside";
   }
-  EXPECT_EQ(abbe("model show out/model.json").exit, 0);
-  const auto compared = abbe("model compare out/model.json out/model.json");
+  EXPECT_EQ(abbe_shared("model show kept_out/model.json").exit, 0);
+  const auto compared = abbe_shared("model compare kept_out/model.json kept_out/model.json");
   EXPECT_EQ(compared.exit, 0) << compared.err;
-  EXPECT_THAT(test::text_of(out("report.html")),
+  EXPECT_THAT(test::text_of(shared("report.html")),
               ::testing::AllOf(HasSubstr("Multi-Feature Bar"),
                                HasSubstr("<th>temperature of the bar</th>")));
 }
@@ -254,10 +277,8 @@ TEST_F(MfbCli, EstimatesTheDriftOfForwardAndBackwardPasses) {
 }
 
 TEST_F(MfbCli, TheReportOfAKeptModelIsMadeAgainFromTheStore) {
-  const std::string page = test::expect_same_report_from_store(
-      folder_.path(),
-      "identify mfb --machine machine.toml --bar bar.toml --plan plan.toml --points points.csv");
-  const auto document = read_model(folder_.path() / "kept_out/model.json");
+  const std::string page = test::expect_same_report_from_store(shared_->path(), identified_);
+  const auto document = read_model(shared("model.json"));
   ASSERT_TRUE(document && document->run && document->bar);
   const auto& parts = document->run->parts;
   ASSERT_EQ(parts.size(), document->bar->passes.size());

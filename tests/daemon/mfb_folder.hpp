@@ -29,11 +29,14 @@ inline std::vector<std::string> cells_of(const std::string& row) {
 /// A folder with machine.toml, bar.toml, plan.toml and points.csv.
 class MfbFolder : public ::testing::Test {
  protected:
-  void SetUp() override {
-    write("machine.toml", reference_machine_toml());
-    write("bar.toml", reference_bar_toml());
-    write("plan.toml", reference_plan_toml());
-    write("points.csv", reference_points_csv());
+  void SetUp() override { write_reference_files(folder_.path()); }
+  static void write_reference_files(const std::filesystem::path& folder) {
+    static const std::string bar = reference_bar_toml(), plan = reference_plan_toml(),
+                             points = reference_points_csv();
+    write_text(folder / "machine.toml", reference_machine_toml());
+    write_text(folder / "bar.toml", bar);
+    write_text(folder / "plan.toml", plan);
+    write_text(folder / "points.csv", points);
   }
   void write(const std::string& name, const std::string& text) const {
     write_text(folder_.path() / name, text);

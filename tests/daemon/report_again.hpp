@@ -13,11 +13,13 @@
 
 namespace abbe::daemon::test {
 
-/// Runs `abbe COMMAND --keep kept -o kept_out --json` and `abbe report` on the stored model: both
-/// reports must have the same bytes. Returns the report; empty after a failure.
+/// Options of an identification whose report is compared.
+inline constexpr const char* kKept = "--keep kept -o kept_out --json";
+
+/// Runs `abbe report` on the model of an identification with the options kKept: both reports must
+/// have the same bytes. Returns the report; empty after a failure.
 inline std::string expect_same_report_from_store(const std::filesystem::path& folder,
-                                                 const std::string& command) {
-  const auto identified = run_abbe(folder, command + " --keep kept -o kept_out --json");
+                                                 const Ran& identified) {
   const auto summary = nlohmann::json::parse(identified.out, nullptr, false);
   EXPECT_TRUE(summary.is_object() && summary.contains("id")) << identified.out << identified.err;
   if (!summary.is_object() || !summary.contains("id")) return {};

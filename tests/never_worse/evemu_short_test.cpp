@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "evemu_run.hpp"
+#include "repetitions.hpp"
 
 namespace {
 using namespace abbe::tests::never_worse;
@@ -92,7 +93,8 @@ TEST(NeverWorseBallArray, TheUncertaintyCoversEstimatesThatTheDataDoNotDistingui
 }
 
 TEST(NeverWorseBallArray, SoundRunsAreAccepted) {
-  const auto none = tallies_of(ball_array({"none"}), 4, kFirstSeed).front();
+  const auto none =
+      tallies_of(ball_array({"none"}), abbe::tests::repetitions(4), kFirstSeed).front();
   EXPECT_EQ(none.accepted, none.runs) << none.other_reason;
   EXPECT_EQ(none.worse, 0);
 }

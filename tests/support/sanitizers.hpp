@@ -15,3 +15,10 @@
 #define ABBE_MEMORY_SANITIZER
 #endif
 #endif
+
+// Runs beside the address sanitizer, or alone.
+#if defined(__has_feature)
+#if __has_feature(undefined_behavior_sanitizer)
+#define ABBE_UNDEFINED_SANITIZER
+#endif
+#endif

@@ -25,7 +25,7 @@
 #include "abbe/result/try.hpp"
 #include "abbe/tables/gauge_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
-#include "bar_passes_file.hpp"
+#include "abbe/tasks/bar_passes_file.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "identify_bar.hpp"
@@ -41,7 +41,7 @@ namespace mfb = calib::mfb;
 
 struct CalibrateBarArguments {
   DaemonSocket where;
-  IdentifyBarArguments files;  ///< gauge: as given; the readings are written to another file
+  IdentifyBarCommand files;  ///< gauge: as given; the readings are written to another file
   std::size_t gauge_runs = 3, at_most = 0;
   double clearance_mm = 4.0, travel_height_mm = 40.0;
   bool continues = false, yes = false;
@@ -296,10 +296,10 @@ int run(const CalibrateBarArguments& arguments) {
     return 0;
   }
 
-  IdentifyBarArguments files = arguments.files;
+  IdentifyBarCommand files = arguments.files;
   files.points = calibration.points_file().string();
   files.gauge = calibration.gauge_file().string();
-  return identify_bar(files);
+  return run_identify_bar(files);
 }
 
 void add_files(CLI::App& command, CalibrateBarArguments& arguments) {

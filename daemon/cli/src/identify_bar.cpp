@@ -7,15 +7,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include "abbe/base/json_text.hpp"
-#include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/config/calib_error.hpp"
-#include "abbe/result/try.hpp"
-#include "abbe/tables/gauge_file.hpp"
-#include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
 #include "identify_bar.hpp"
 #include "terminal.hpp"
@@ -23,53 +17,11 @@
 namespace abbe::daemon {
 namespace {
 
-struct BarOnMachine {
-  calib::mfb::BarCalibration calibration;
-  std::vector<InputFile> sources;
-  std::size_t repeats = 0;
-  std::vector<std::string> notes;
-};
-
-Result<BarOnMachine> calibrated_bar(const IdentifyBarArguments& arguments) {
-  const auto bar = read_bar_toml(arguments.bar);
-  ABBE_TRY(bar);
-  const auto plan = read_bar_plan_toml(arguments.plan, bar->bar);
-  ABBE_TRY(plan);
-  const auto points =
-      read_bar_points_csv(arguments.points, bar->bar, *plan, nodes_of_measuring_machine());
-  ABBE_TRY(points);
-  const auto gauge = read_gauge_toml(arguments.gauge);
-  ABBE_TRY(gauge);
-
-  auto found = calib::mfb::calibrate_bar(bar->bar, plan->plan, points->passes, gauge->gauge);
-  if (!found) return tl::make_unexpected(error_of(found.error()));
-  BarOnMachine out{std::move(*found),
-                   {bar->source, plan->source, points->source, gauge->source},
-                   plan->plan.measurements.size() / 2,
-                   {}};
-  out.notes = out.calibration.notes;
-  return out;
-}
-
-/// The comment at the head of the file: origin of the data, meaning of the uncertainty.
-std::string head_of(const BarOnMachine& found) {
-  const auto& c = found.calibration;
-  std::string text = fmt::format(
-      "# Calibrated by reversal: {} normal and {} reversed passes. Covariance: k = 1, with the "
-      "mean "
-      "of the\n# repeats ({} degrees of freedom) widened by Student's t, {:.3f} / 1.96.\n",
-      found.repeats, found.repeats, c.degrees_of_freedom, c.student_t95);
-  for (const InputFile& source : found.sources)
-    text += fmt::format("# from {}, SHA-256 {}\n", source.name, source.sha256);
-  for (const std::string& note : found.notes) text += fmt::format("# {}\n", note);
-  return text;
-}
-
 nlohmann::json vector_um(const calib::Vector3& v_m) {
   return {kUmPerM * v_m.x(), kUmPerM * v_m.y(), kUmPerM * v_m.z()};
 }
 
-nlohmann::json bar_json(const BarOnMachine& found, const std::string& out) {
+nlohmann::json bar_json(const IdentifiedBar& found, const std::string& out) {
   const auto& c = found.calibration;
   nlohmann::json points = nlohmann::json::array();
   for (std::size_t i = 0; i < c.bar.O_m.size(); ++i) {
@@ -94,11 +46,11 @@ nlohmann::json bar_json(const BarOnMachine& found, const std::string& out) {
           {"direction", {c.direction.x(), c.direction.y(), c.direction.z()}},
           {"gauge_beside_bar_mm", {kMmPerM * c.gauge_beside_m.y(), kMmPerM * c.gauge_beside_m.z()}},
           {"points", points},
-          {"notes", found.notes},
+          {"notes", c.notes},
           {"written", out}};
 }
 
-void print_summary(const BarOnMachine& found, const std::string& out) {
+void print_summary(const IdentifiedBar& found, const std::string& out) {
   const auto& c = found.calibration;
   fmt::print("{}: {} repeats, Student's t (95 %, {} degrees of freedom) {:.3f}\n", c.bar.name,
              found.repeats, c.degrees_of_freedom, c.student_t95);
@@ -119,26 +71,15 @@ void print_summary(const BarOnMachine& found, const std::string& out) {
       "u(x) of the last hole: repeats {:.3f}, step gauge {:.3f}, Abbe offset {:.3f}, "
       "temperature of the bar {:.3f} um\n",
       kUmPerM * x.repeats_m, kUmPerM * x.gauge_m, kUmPerM * x.abbe_m, kUmPerM * x.temperature_m);
-  for (const std::string& note : found.notes) fmt::print("note: {}\n", note);
+  for (const std::string& note : c.notes) fmt::print("note: {}\n", note);
   fmt::print("written {}\n", out);
 }
 
 }  // namespace
 
-calib::MachineNodes nodes_of_measuring_machine() {
-  constexpr double kFar_m = 50.0;
-  calib::MachineNodes nodes;
-  for (auto& axis : nodes) axis.nodes_m = {-kFar_m, kFar_m};
-  return nodes;
-}
-
-int identify_bar(const IdentifyBarArguments& arguments) {
-  const auto found = calibrated_bar(arguments);
+int run_identify_bar(const IdentifyBarCommand& arguments) {
+  const auto found = identify_bar(arguments);
   if (!found) return report(found.error());
-  if (const auto written =
-          replace_file(arguments.out, bar_toml(found->calibration.bar, head_of(*found)));
-      !written)
-    return report(written.error());
   if (arguments.json)
     fmt::print("{}\n", indented_json_text(bar_json(*found, arguments.out)));
   else
@@ -147,7 +88,7 @@ int identify_bar(const IdentifyBarArguments& arguments) {
 }
 
 void add_identify_bar(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<IdentifyBarArguments>();
+  auto arguments = std::make_shared<IdentifyBarCommand>();
   auto* command = parent.add_subcommand(
       "bar",
       "Calibrate a Multi-Feature Bar by reversal on a measuring machine: passes with the bar as "
@@ -174,7 +115,7 @@ void add_identify_bar(CLI::App& parent, int& exit) {
       ->required();
   command->add_flag("--json", arguments->json, "print the summary as one JSON object");
   command->add_option("-o,--out", arguments->out, "file to write: bar.toml")->required();
-  command->callback([arguments, &exit] { exit = identify_bar(*arguments); });
+  command->callback([arguments, &exit] { exit = run_identify_bar(*arguments); });
 }
 
 }  // namespace abbe::daemon

@@ -1,21 +1,15 @@
 #pragma once
-/// The identification of `abbe identify bar` and, after its touches, of `abbe calibrate bar`.
+/// What `abbe identify bar` does and, after its touches, `abbe calibrate bar`.
 
-#include <string>
-
-#include "abbe/calib/mfb/run/measurement.hpp"
+#include "abbe/tasks/identify_bar.hpp"
 
 namespace abbe::daemon {
 
-struct IdentifyBarArguments {
-  std::string bar, plan, points, gauge, out;
+struct IdentifyBarCommand : IdentifyBarArguments {
   bool json = false;
 };
 
-/// A measuring machine has no file: its readings may be anywhere.
-[[nodiscard]] calib::MachineNodes nodes_of_measuring_machine();
-
-/// Reads the files, writes bar.toml, prints the summary. Returns the exit code.
-[[nodiscard]] int identify_bar(const IdentifyBarArguments& arguments);
+/// Prints the summary. Returns the exit code.
+[[nodiscard]] int run_identify_bar(const IdentifyBarCommand& arguments);
 
 }  // namespace abbe::daemon

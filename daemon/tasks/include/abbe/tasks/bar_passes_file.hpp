@@ -2,6 +2,7 @@
 /// The touches that `abbe calibrate bar` makes, pass by pass, as barpoints.csv of `abbe identify
 /// bar`.
 
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <map>

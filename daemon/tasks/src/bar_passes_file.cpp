@@ -1,4 +1,4 @@
-#include "bar_passes_file.hpp"
+#include "abbe/tasks/bar_passes_file.hpp"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,32 @@
+#pragma once
+/// A Multi-Feature Bar, calibrated by reversal on a measuring machine.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/base/input_file.hpp"
+#include "abbe/calib/mfb/identify/bar_calibration.hpp"
+#include "abbe/calib/mfb/run/measurement.hpp"
+
+namespace abbe::daemon {
+
+/// File names; `out`: bar.toml.
+struct IdentifyBarArguments {
+  std::string bar, plan, points, gauge, out;
+};
+
+struct IdentifiedBar {
+  calib::mfb::BarCalibration calibration;
+  std::vector<InputFile> sources;
+  std::size_t repeats = 0;  ///< normal passes, and as many reversed ones
+};
+
+/// A measuring machine has no file: its readings may be anywhere.
+[[nodiscard]] calib::MachineNodes nodes_of_measuring_machine();
+
+/// Reads the files and writes `arguments.out`. Errors name file and line.
+[[nodiscard]] Result<IdentifiedBar> identify_bar(const IdentifyBarArguments& arguments);
+
+}  // namespace abbe::daemon

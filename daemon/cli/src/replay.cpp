@@ -15,6 +15,8 @@
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
+#include "abbe/recording/recording_reader.hpp"
+#include "abbe/replay/replay.hpp"
 #include "abbe/tasks/replay_recording.hpp"
 #include "commands.hpp"
 #include "sample_lines.hpp"

@@ -45,7 +45,7 @@ Result<ReplayedRecording> replay_recording(const ReplayArguments& arguments,
   const auto stopped = [&progress] { return progress.stopped(); };
   auto recording = RecordingReader::open(arguments.file, stopped);
   ABBE_TRY(recording);
-  for (const auto& loss : recording->losses()) show_loss(loss);
+  if (show_loss) std::ranges::for_each(recording->losses(), show_loss);
 
   const auto config = config_of_replay(arguments, *recording);
   ABBE_TRY(config);

@@ -29,7 +29,8 @@ struct ReplayedRecording {
   std::chrono::duration<double> wall{};  ///< real time for reading the file and replaying it
 };
 
-/// Is called for each part of the file that is missing or damaged, before the replay begins.
+/// Is called for each part of the file that is missing or damaged, before the replay begins. May be
+/// empty.
 using ShowLoss = std::function<void(const RecordingLoss&)>;
 
 /// Writes no file. Io or BadInput if the file or its configuration cannot be read, or the file

@@ -11,6 +11,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include "abbe/base/input_file.hpp"
 
 namespace abbe::daemon {
 
@@ -84,6 +87,12 @@ Result<std::string> sha256_hex_of_file(const std::filesystem::path& file) {
   if (in.bad())
     return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
   return hash.hex();
+}
+
+Result<InputFile> hashed_file(const std::filesystem::path& file) {
+  return sha256_hex_of_file(file).map([&](std::string hash) {
+    return InputFile{file.filename().string(), std::move(hash)};
+  });
 }
 
 }  // namespace abbe::daemon

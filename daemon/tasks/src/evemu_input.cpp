@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <cstddef>
-#include <filesystem>
 #include <memory>
 #include <utility>
 #include <vector>
 
-#include "abbe/base/sha256.hpp"
+#include "abbe/base/input_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_input.hpp"
@@ -123,10 +122,10 @@ evemu::ObserveOptions observe_options(const EvemuInputArguments& arguments,
 Result<EvemuInput> from_files(const EvemuInputArguments& arguments) {
   auto config = load_config(arguments.machine);
   ABBE_TRY(config);
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  ABBE_TRY(hash);
+  const auto source = hashed_file(arguments.machine);
+  ABBE_TRY(source);
   EvemuInput input;
-  input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
+  input.sources.push_back(*source);
 
   const auto* what = arguments.touches.empty() ? "errors" : "touches";
   ABBE_TRY(check_scales("identify evemu", what, *config, arguments.scales_corrected));

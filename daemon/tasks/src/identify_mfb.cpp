@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <filesystem>
 #include <utility>
 #include <vector>
 
-#include "abbe/base/sha256.hpp"
+#include "abbe/base/input_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/wall_clock.hpp"
 #include "abbe/calib/mfb/run/touches_off.hpp"
@@ -81,8 +80,8 @@ Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments,
 Result<MfbInput> input_of_files(const IdentifyMfbArguments& arguments) {
   auto config = read_config(arguments);
   ABBE_TRY(config);
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  ABBE_TRY(hash);
+  const auto source = hashed_file(arguments.machine);
+  ABBE_TRY(source);
   const auto machine = mfb_machine(config->machine);
   ABBE_TRY(machine);
   auto bar = read_bar_toml(arguments.bar);
@@ -97,10 +96,7 @@ Result<MfbInput> input_of_files(const IdentifyMfbArguments& arguments) {
                   .plan = std::move(plan->plan),
                   .passes = std::move(points->passes),
                   .options = options_of(arguments)},
-                 {{std::filesystem::path(arguments.machine).filename().string(), *hash},
-                  bar->source,
-                  plan->source,
-                  points->source}};
+                 {*source, bar->source, plan->source, points->source}};
   input.lines = std::move(points->lines);
   input.against_pass = std::move(points->against_pass);
   return input;

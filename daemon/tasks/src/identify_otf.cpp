@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <numbers>
 #include <optional>
 #include <utility>
 
-#include "abbe/base/sha256.hpp"
+#include "abbe/base/input_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/wall_clock.hpp"
 #include "abbe/calib/otf/solve/other_beams.hpp"
@@ -93,46 +92,44 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
           candidate.solution.smoothness};
 }
 
+Result<MachineAndPath> read_machine_and_path(const IdentifyOtfArguments& arguments) {
+  auto config = load_config(arguments.machine);
+  ABBE_TRY(config);
+  auto machine = hashed_file(arguments.machine);
+  ABBE_TRY(machine);
+  auto path = read_path_csv(arguments.path);
+  ABBE_TRY(path);
+  std::vector<InputFile> sources{std::move(*machine), path->source};
+  return MachineAndPath{std::move(*config), std::move(*path), std::move(sources)};
+}
+
 namespace {
 
-struct Files {
-  Config config;
-  PathFile path;
+struct Files : MachineAndPath {
   TrackerFile tracker;
-  std::optional<EncoderFile> encoder;
-  std::vector<InputFile> sources;
+  std::optional<EncoderFile> encoder = {};
 };
 
 Result<Files> read_files(const IdentifyOtfArguments& arguments, const Progress& progress) {
-  auto config = load_config(arguments.machine);
-  ABBE_TRY(config);
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  ABBE_TRY(hash);
-  auto path = read_path_csv(arguments.path);
-  ABBE_TRY(path);
+  auto read = read_machine_and_path(arguments);
+  ABBE_TRY(read);
   auto tracker = read_tracker_csv(
       arguments.tracker, [&](double fraction) { progress.show("reading the tracker", fraction); });
   ABBE_TRY(tracker);
   ABBE_TRY(place_tracker(*tracker, arguments.tracker_centre_m(0), arguments.tracker,
                          arguments.centre_option));
-  ABBE_TRY(check_time_unit(arguments.tracker, *tracker, *path));
-  std::vector<InputFile> sources{
-      {std::filesystem::path(arguments.machine).filename().string(), *hash},
-      path->source,
-      tracker->source};
-  std::optional<EncoderFile> encoder;
+  ABBE_TRY(check_time_unit(arguments.tracker, *tracker, read->path));
+  Files files{std::move(*read), std::move(*tracker)};
+  files.sources.push_back(files.tracker.source);
+  if (arguments.encoder.empty()) return files;
 
-  if (!arguments.encoder.empty()) {
-    auto read = read_encoder_csv(
-        arguments.encoder, [&](double fraction) { progress.show("reading the scales", fraction); });
-    ABBE_TRY(read);
-    ABBE_TRY(check_time_unit(arguments.encoder, *read, *path));
-    sources.push_back(read->source);
-    encoder = std::move(*read);
-  }
-
-  return Files{std::move(*config), std::move(*path), std::move(*tracker), std::move(encoder),
-               std::move(sources)};
+  auto encoder = read_encoder_csv(
+      arguments.encoder, [&](double fraction) { progress.show("reading the scales", fraction); });
+  ABBE_TRY(encoder);
+  ABBE_TRY(check_time_unit(arguments.encoder, *encoder, files.path));
+  files.sources.push_back(encoder->source);
+  files.encoder = std::move(*encoder);
+  return files;
 }
 
 /// Compares the readings of the scales with the path at every vertex where the machine stood still.

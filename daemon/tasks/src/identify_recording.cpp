@@ -72,7 +72,6 @@ Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments,
       .progress = [&progress](double share) { progress.show("identifying", share); }};
   auto identified = identify_otf(otf_task(*run, *config, watch), *config, nullptr);
   ABBE_TRY(identified);
-  if (run->unmeasured_air) identified->verdict.notes.push_back(*run->unmeasured_air);
   judge_recording(recording->reader, identified->verdict);
   return OtfFromFiles{*std::move(config),
                       {recording->source},

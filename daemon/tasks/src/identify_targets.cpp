@@ -3,9 +3,7 @@
 
 #include <array>
 #include <charconv>
-#include <filesystem>
 
-#include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/otf/identify/targets.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -27,11 +25,8 @@ struct TargetPoints {
   std::string file;
 };
 
-struct TargetRuns {
-  Config config;
-  PathFile path;
-  std::vector<TargetPoints> runs;
-  std::vector<InputFile> sources;
+struct TargetRuns : MachineAndPath {
+  std::vector<TargetPoints> runs = {};
 };
 
 Error not_a_target(const std::string& text) {
@@ -60,16 +55,10 @@ Result<std::pair<calib::Vector3, std::string>> parse_target(const std::string& t
 }
 
 Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, const Progress& progress) {
-  auto config = load_config(arguments.machine);
-  ABBE_TRY(config);
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  ABBE_TRY(hash);
-  auto path = read_path_csv(arguments.path);
-  ABBE_TRY(path);
+  auto read = read_machine_and_path(arguments);
+  ABBE_TRY(read);
 
-  TargetRuns all{std::move(*config), std::move(*path), {}, {}};
-  all.sources = {{std::filesystem::path(arguments.machine).filename().string(), *hash},
-                 all.path.source};
+  TargetRuns all{std::move(*read)};
   for (const auto& text : arguments.targets) {
     const auto target = parse_target(text);
     ABBE_TRY(target);

@@ -7,7 +7,7 @@
 #include <initializer_list>
 #include <utility>
 
-#include "abbe/base/sha256.hpp"
+#include "abbe/base/input_file.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/evemu/identification.hpp"
 #include "abbe/methods/otf/inputs.hpp"
@@ -226,15 +226,14 @@ Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments,
                             "run would contain the prior, and all together would count it once "
                             "for each of them",
                             arguments.machine));
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  ABBE_TRY(hash);
+  const auto source = hashed_file(arguments.machine);
+  ABBE_TRY(source);
   const auto files = read_parts_toml(arguments.parts);
   ABBE_TRY(files);
 
   JointInput input;
   input.config = std::move(*config);
-  input.sources = {{std::filesystem::path(arguments.machine).filename().string(), *hash},
-                   files->source};
+  input.sources = {*source, files->source};
   for (const RunFiles& run : files->runs) ABBE_TRY(add_run(arguments, run, input, progress));
   note_unshared_offsets(files->runs, input.facts);
   for (const ArrayFiles& array : files->arrays)

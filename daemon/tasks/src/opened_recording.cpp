@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
 #include <utility>
 
-#include "abbe/base/sha256.hpp"
+#include "abbe/base/input_file.hpp"
 #include "abbe/replay/replay.hpp"
 #include "abbe/result/try.hpp"
 
@@ -18,11 +17,9 @@ Result<OpenedRecording> open_recording(const std::string& file, const std::strin
   auto read = config.empty() ? recorded : load_config(config);
   ABBE_TRY(read);
   if (!config.empty()) take_recorded_readings(*read, recorded ? &*recorded : nullptr);
-  const auto hash = sha256_hex_of_file(file);
-  ABBE_TRY(hash);
-  return OpenedRecording{std::move(*reader),
-                         std::move(*read),
-                         {std::filesystem::path(file).filename().string(), *hash}};
+  auto source = hashed_file(file);
+  ABBE_TRY(source);
+  return OpenedRecording{std::move(*reader), std::move(*read), std::move(*source)};
 }
 
 namespace {

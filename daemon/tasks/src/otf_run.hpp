@@ -12,6 +12,14 @@ namespace abbe::daemon {
 [[nodiscard]] OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
                                     std::vector<InputFile> sources);
 
+struct MachineAndPath {
+  Config config;
+  PathFile path;
+  std::vector<InputFile> sources;  ///< of both
+};
+/// Reads --machine and --path.
+[[nodiscard]] Result<MachineAndPath> read_machine_and_path(const IdentifyOtfArguments& arguments);
+
 /// --u-scale-ppm, or that of the configured tracker; 0 without both.
 [[nodiscard]] double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config);
 

@@ -58,6 +58,7 @@ OtfTask otf_task(const OtfRun& run, const Config& config, const IdentificationWa
   task.noise.u_axis_scale = run.u_axis_scale;
   task.options = otf_options(task.points, config);
   task.options.mode = run.mode;
+  task.unmeasured_air = run.unmeasured_air;
 
   // A live run has scale readings, and they were found to agree with the path at its vertices.
   task.options.orientation.scales_agree = true;
@@ -82,6 +83,7 @@ Result<IdentifiedRun> identify_otf(const OtfTask& task, const Config& config,
       calib::otf::judge(found->observations, found->solution, active, gate_limits(config.gate),
                         task.options, calib::otf::held_out_into(residuals));
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
+  if (task.unmeasured_air) verdict->notes.push_back(*task.unmeasured_air);
   return IdentifiedRun{task.noise, *std::move(found), *std::move(verdict), std::move(residuals)};
 }
 

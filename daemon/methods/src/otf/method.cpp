@@ -87,7 +87,6 @@ Result<OtfMethod::Candidate> OtfMethod::identify(const Run& run, const Config& c
                                                  const IdentificationWatch& watch) {
   auto identified = identify_otf(otf_task(run, config, watch), config, active);
   ABBE_TRY(identified);
-  if (run.unmeasured_air) identified->verdict.notes.push_back(*run.unmeasured_air);
   return OtfCandidate{std::move(identified->found.solution), std::move(identified->verdict),
                       run.mode, std::move(identified->residuals), run.temperature_K};
 }

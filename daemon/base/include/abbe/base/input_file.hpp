@@ -2,8 +2,10 @@
 /// Types that all readers of files share: the identity of the file that was read, and the callback
 /// that reports the progress of reading.
 
+#include <filesystem>
 #include <string>
 
+#include "abbe/base/error.hpp"
 #include "abbe/protocol/table/number_table.hpp"
 
 namespace abbe::daemon {
@@ -15,6 +17,9 @@ struct InputFile {
   std::string sha256;
   friend bool operator==(const InputFile&, const InputFile&) = default;
 };
+
+/// Hashes the file; Io if it cannot be read.
+[[nodiscard]] Result<InputFile> hashed_file(const std::filesystem::path& file);
 
 using protocol::ReadProgress;
 

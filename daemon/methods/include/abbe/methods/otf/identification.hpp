@@ -58,6 +58,7 @@ struct OtfTask {
   /// Scale readings with times of the machine's clock, for the component along the path. Readings
   /// of another drive are not used: a note in the observations states why.
   std::optional<calib::otf::EncoderLog> scales{};
+  std::optional<std::string> unmeasured_air{};  ///< OtfRun::unmeasured_air
 };
 /// Of an acquired run, with the options of [otf].
 [[nodiscard]] OtfTask otf_task(const OtfRun& run, const Config& config,

@@ -75,9 +75,9 @@ TEST_F(CalibrationServiceTest, KeepsTheVerdictsOfEndedSessionsByTheirNumber) {
     EXPECT_EQ(*started, id);
     ASSERT_TRUE(service_->cancel("anna", now_));
   }
-  ASSERT_EQ(service_->ended().size(), CalibrationService::kEndedKept);
-  EXPECT_EQ(service_->ended().front().id, 3u);
-  EXPECT_EQ(service_->ended().back().reason, "cancelled by anna");
+  ASSERT_EQ(service_->session().ended().size(), CalibrationSession::kEndedKept);
+  EXPECT_EQ(service_->session().ended().front().id, 3u);
+  EXPECT_EQ(service_->session().ended().back().reason, "cancelled by anna");
 }
 
 TEST_F(CalibrationServiceTest, AnIdentificationIsCancelledAndTheNextCanStart) {

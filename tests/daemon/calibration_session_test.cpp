@@ -430,6 +430,7 @@ TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
     for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
     drive.stand(kPath.back(), 2s);
     ASSERT_TRUE(session.take_run());
+    session.identified({}, drive.now());
     session.judged("model", passed, "verdict", drive.now());
     std::vector<SessionState> track;
     for (const auto& event : session.take_events()) track.push_back(event.status.state);
@@ -437,6 +438,43 @@ TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
                                   SessionState::Identifying, SessionState::Judged,
                                   passed ? SessionState::Active : SessionState::Refused}));
   }
+}
+
+TEST(CalibrationSession, TheIdentificationOfACancelledSessionEndsBeforeTheNextStarts) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+  drive.stand(kPath.back(), 2s);
+  ASSERT_TRUE(session.take_run());
+  ASSERT_TRUE(session.cancel("anna", drive.now()));
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+
+  const auto early = session.start({OtfRequest{kPath}, drive.now()});
+  ASSERT_FALSE(early);
+  EXPECT_THAT(early.error().text, testing::HasSubstr("is still ending"));
+  session.not_identified({ErrorCode::Refused, "stopped"}, drive.now());
+  EXPECT_EQ(session.status().reason, "cancelled by anna");
+  EXPECT_TRUE(session.start({OtfRequest{kPath}, drive.now()}));
+}
+
+TEST(CalibrationSession, AModelThatIsBeingStoredIsNotCancelled) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+  drive.stand(kPath.back(), 2s);
+  ASSERT_TRUE(session.take_run());
+  session.identified({}, drive.now());
+  EXPECT_FALSE(session.cancel("anna", drive.now()));
+  EXPECT_EQ(session.stage(), SessionStage::Storing);
+
+  session.store_failed("model 0123 is not stored", "tried again", drive.now());
+  EXPECT_EQ(session.status().reason, "model 0123 is not stored; tried again");
+  EXPECT_TRUE(session.cancel("anna", drive.now()));
+  EXPECT_EQ(session.not_stored(), "");
 }
 
 TEST(CalibrationSession, CancelEndsARunningSessionOnly) {

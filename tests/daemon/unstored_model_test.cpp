@@ -73,7 +73,7 @@ class UnstoredModel : public ::testing::Test {
     start();
     block_store();
     drive();
-    cycle_until([this] { return !service_->not_stored().empty(); });
+    cycle_until([this] { return !service_->session().not_stored().empty(); });
     free_store();
     const int lock =
         ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
@@ -105,19 +105,19 @@ TEST_F(UnstoredModel, AModelTheStoreDoesNotTakeIsKeptTriedAgainAndReported) {
   start();
   block_store();
   drive();
-  cycle_until([this] { return !service_->not_stored().empty(); });
+  cycle_until([this] { return !service_->session().not_stored().empty(); });
 
   EXPECT_EQ(state(), SessionState::Identifying);
-  EXPECT_THAT(service_->not_stored(), HasSubstr("is not stored"));
+  EXPECT_THAT(service_->session().not_stored(), HasSubstr("is not stored"));
   EXPECT_THAT(service_->status().reason, HasSubstr("tried again every 5 s"));
   free_store();
   now_ += 4s;
   for (int i = 0; i < 3; ++i) (void)service_->cycle({}, now_);
-  EXPECT_THAT(service_->not_stored(), Not(IsEmpty())) << "not before its time";
+  EXPECT_THAT(service_->session().not_stored(), Not(IsEmpty())) << "not before its time";
   now_ += 1s;
   cycle_until_over();
   EXPECT_EQ(state(), SessionState::Active) << service_->status().reason;
-  EXPECT_THAT(service_->not_stored(), IsEmpty());
+  EXPECT_THAT(service_->session().not_stored(), IsEmpty());
   EXPECT_EQ(authority_->active_model()->id, model_id(stored()));
 }
 
@@ -137,10 +137,10 @@ TEST_F(UnstoredModel, CancelDiscardsAModelTheStoreDoesNotTake) {
   start();
   block_store();
   drive();
-  cycle_until([this] { return !service_->not_stored().empty(); });
+  cycle_until([this] { return !service_->session().not_stored().empty(); });
   ASSERT_TRUE(service_->cancel("anna", now_));
   EXPECT_EQ(state(), SessionState::Refused);
-  EXPECT_THAT(service_->not_stored(), IsEmpty());
+  EXPECT_THAT(service_->session().not_stored(), IsEmpty());
   free_store();
   now_ += 10s;
   (void)service_->cycle({}, now_);
@@ -154,20 +154,20 @@ TEST_F(UnstoredModel, CancelDiscardsAModelWhileTheStoreDoesNotRespond) {
       ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
   ASSERT_EQ(::flock(lock, LOCK_EX), 0);
   drive();
-  cycle_until([this] { return service_->held_out().has_value(); });
+  cycle_until([this] { return service_->session().held_out().has_value(); });
   const auto early = service_->cancel("anna", now_);
   ASSERT_FALSE(early);
   EXPECT_THAT(early.error().text, HasSubstr("already being stored"));
   now_ += 6s;
   (void)service_->cycle({}, now_);
-  EXPECT_THAT(service_->not_stored(), HasSubstr("the store has not answered for 5 s"));
+  EXPECT_THAT(service_->session().not_stored(), HasSubstr("the store has not answered for 5 s"));
   EXPECT_THAT(service_->status().reason, HasSubstr("cancel discards it"));
   const auto cancelled = service_->cancel("anna", now_);
   ASSERT_TRUE(cancelled) << cancelled.error().text;
   EXPECT_EQ(state(), SessionState::Refused);
   EXPECT_THAT(service_->status().reason,
               HasSubstr("cancelled by anna; the store does not answer and may still"));
-  EXPECT_THAT(service_->not_stored(), IsEmpty());
+  EXPECT_THAT(service_->session().not_stored(), IsEmpty());
   const OtfRequest next{test::synthetic_request_path_m()};
   EXPECT_TRUE(service_->start(next, "anna", now_)) << "the next calibration";
 
@@ -182,7 +182,7 @@ TEST_F(UnstoredModel, TheEndOfTheDaemonTriesOnceMoreToStoreTheModel) {
   start();
   block_store();
   drive();
-  cycle_until([this] { return !service_->not_stored().empty(); });
+  cycle_until([this] { return !service_->session().not_stored().empty(); });
   free_store();
   service_.reset();
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), SizeIs(1));

@@ -39,15 +39,6 @@ std::optional<RequestedTouch> next_of(const Acquisition& acquisition) {
 
 }  // namespace
 
-bool CalibrationSession::running() const noexcept {
-  return status_.state == SessionState::Warming || status_.state == SessionState::Acquiring ||
-         status_.state == SessionState::Identifying || status_.state == SessionState::Judged;
-}
-
-bool CalibrationSession::acquiring() const noexcept {
-  return takes_readings(status_.state);
-}
-
 Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const {
   return Methods::visit(
       std::move(task), [this](auto method, auto&& request) -> Result<PreparedSession> {
@@ -58,7 +49,12 @@ Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const 
       });
 }
 
-Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from) {
+Result<void> CalibrationSession::start(PreparedSession&& prepared, std::string who, HostTime from) {
+  if (stage_ == SessionStage::Ending) {
+    return fail(ErrorCode::Refused,
+                fmt::format("calibrate {}: the identification of a cancelled run is still ending",
+                            prepared.method));
+  }
   if (running()) {
     return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is already {}",
                                                 prepared.method, name(status_.state)));
@@ -66,11 +62,15 @@ Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from
 
   std::visit([from](auto& a) { a.begin(from); }, prepared.acquisition);
   acquisition_.emplace(std::move(prepared.acquisition));
+  if (status_.id != 0) ended_.push_back(std::move(status_));
+  if (ended_.size() > kEndedKept) ended_.pop_front();
   status_ = {};
   status_.id = ++started_;
   status_.method = prepared.method;
   status_.next = next_of(*acquisition_);
-  enter(SessionState::Warming, std::visit([](const auto& a) { return a.reason(); }, *acquisition_),
+  who_ = std::move(who);
+  std::swap(request_text_, prepared.request_text);  // the caller destroys the previous text
+  enter(SessionStep::Start, std::visit([](const auto& a) { return a.reason(); }, *acquisition_),
         from);
 
   return {};
@@ -79,13 +79,19 @@ Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from
 Result<void> CalibrationSession::start(CalibrationRequest request) {
   auto prepared = prepare(std::move(request.task));
   ABBE_TRY(prepared);
-  return start(std::move(*prepared), request.from);
+  return start(std::move(*prepared), {}, request.from);
 }
 
 Result<void> CalibrationSession::cancel(std::string who, HostTime now) {
-  if (!running()) return fail(ErrorCode::Refused, "cancel: no session is running");
-  enter(SessionState::Refused, fmt::format("cancelled by {}", who), now);
-  return {};
+  if (enter(SessionStep::Cancel, fmt::format("cancelled by {}", who), now)) return {};
+  return fail(ErrorCode::Refused, stage_ == SessionStage::Storing
+                                      ? "cancel: the model is already being stored"
+                                      : "cancel: no session is running");
+}
+
+Result<void> CalibrationSession::give_up_store(std::string who, HostTime now) {
+  if (enter(SessionStep::GiveUpStore, fmt::format("cancelled by {}", who), now)) return {};
+  return cancel(std::move(who), now);
 }
 
 void CalibrationSession::take(const protocol::Snapshot& snapshot) {
@@ -120,13 +126,13 @@ void CalibrationSession::follow_acquisition(HostTime now) {
     case AcquisitionPhase::WaitingAtStart:
       break;
     case AcquisitionPhase::Running:
-      if (status_.state == SessionState::Warming) enter(SessionState::Acquiring, reason, now);
+      if (stage_ == SessionStage::Warming) enter(SessionStep::RunBegins, reason, now);
       break;
     case AcquisitionPhase::Complete:
-      enter(SessionState::Identifying, reason, now);
+      enter(SessionStep::RunCompletes, reason, now);
       break;
     case AcquisitionPhase::Failed:
-      enter(SessionState::Refused, reason, now);
+      enter(SessionStep::RunFails, reason, now);
       break;
   }
 }
@@ -139,7 +145,7 @@ void CalibrationSession::follow_guidance(Guided& acquisition, HostTime now) {
   for (const std::string& note : notes) {
     status_.notes.push_back(note);
     ++status_.noted;
-    enter(status_.state, note, now);
+    add_event(note, now);
   }
 
   if (status_.notes.size() > SessionStatus::kMostNotes) {
@@ -149,15 +155,14 @@ void CalibrationSession::follow_guidance(Guided& acquisition, HostTime now) {
   }
 
   status_.next = acquisition.next();
-  const bool same_state = acquisition.phase() == (status_.state == SessionState::Warming
-                                                      ? AcquisitionPhase::WaitingAtStart
-                                                      : AcquisitionPhase::Running);
-  if (same_state && acquisition.reason() != status_.reason)
-    enter(status_.state, acquisition.reason(), now);
+  const bool same_state =
+      acquisition.phase() == (stage_ == SessionStage::Warming ? AcquisitionPhase::WaitingAtStart
+                                                              : AcquisitionPhase::Running);
+  if (same_state && acquisition.reason() != status_.reason) add_event(acquisition.reason(), now);
 }
 
 std::optional<RunNews> CalibrationSession::take_news() {
-  if (status_.state != SessionState::Acquiring) return std::nullopt;
+  if (stage_ != SessionStage::Acquiring) return std::nullopt;
   return std::visit(
       [](auto& a) -> std::optional<RunNews> {
         if constexpr (kLive<decltype(a)>)
@@ -168,7 +173,7 @@ std::optional<RunNews> CalibrationSession::take_news() {
 }
 
 std::optional<Acquisition> CalibrationSession::take_run() {
-  if (status_.state != SessionState::Identifying || !acquisition_) return std::nullopt;
+  if (!go(SessionStep::RunTaken, since_)) return std::nullopt;
   status_.progress = 0.0;
   return std::exchange(acquisition_, std::nullopt);
 }
@@ -179,39 +184,75 @@ CalibrationRun run_of(Acquisition acquired) {
   });
 }
 
+void CalibrationSession::not_identified(const Error& why, HostTime now) {
+  if (stage_ == SessionStage::Ending) {  // cancelled meanwhile: refused already
+    (void)go(SessionStep::NoModel, now);
+    return;
+  }
+  if (stage_ != SessionStage::Identifying) return;
+  status_.refused_as = why.code;
+  enter(SessionStep::NoModel, why.text, now);
+}
+
+void CalibrationSession::identified(const calib::HeldOutFigures& held_out, HostTime now) {
+  if (go(SessionStep::ModelIdentified, now)) held_out_ = held_out;
+}
+
+void CalibrationSession::store_failed(std::string fault, std::string_view advice, HostTime now) {
+  if (go(SessionStep::StoreFails, now)) report_not_stored(std::move(fault), advice, now);
+}
+
+void CalibrationSession::store_stalls(std::string fault, std::string_view advice, HostTime now) {
+  if (stage_ == SessionStage::Storing) report_not_stored(std::move(fault), advice, now);
+}
+
+void CalibrationSession::report_not_stored(std::string fault, std::string_view advice,
+                                           HostTime now) {
+  std::string reason = fmt::format("{}; {}", fault, advice);
+  not_stored_ = std::move(fault);
+  if (reason != status_.reason) add_event(std::move(reason), now);
+}
+
 void CalibrationSession::judged(std::string model_id, bool passed, std::string reason,
                                 HostTime now) {
-  if (status_.state != SessionState::Identifying) return;  // cancelled meanwhile
+  if (!next_stage(stage_, SessionStep::ModelStored)) return;
   status_.model_id = std::move(model_id);
-  enter(SessionState::Judged, reason, now);
+  enter(SessionStep::ModelStored, reason, now);
   status_.refused_as = ErrorCode::Refused;
-  enter(passed ? SessionState::Active : SessionState::Refused, std::move(reason), now);
-}
-
-void CalibrationSession::not_identified(const Error& why, HostTime now) {
-  if (status_.state != SessionState::Identifying) return;
-  status_.refused_as = why.code;
-  enter(SessionState::Refused, why.text, now);
-}
-
-void CalibrationSession::not_stored(std::string reason, HostTime now) {
-  if (status_.state != SessionState::Identifying || reason == status_.reason) return;
-  enter(SessionState::Identifying, std::move(reason), now);
+  enter(passed ? SessionStep::VerdictPasses : SessionStep::VerdictFails, std::move(reason), now);
 }
 
 std::vector<SessionEvent> CalibrationSession::take_events() {
   return std::exchange(events_, {});
 }
 
-void CalibrationSession::enter(SessionState state, std::string reason, HostTime now) {
-  status_.state = state;
-  status_.reason = std::move(reason);
-  if (state != SessionState::Acquiring) status_.remaining.reset();
-  if (state == SessionState::Active || state == SessionState::Refused) {
+/// The only function that changes the stage. False if the step is not possible in this stage.
+bool CalibrationSession::go(SessionStep step, HostTime now) {
+  const auto next = next_stage(stage_, step);
+  if (!next) return false;
+  stage_ = *next;
+  since_ = now;
+  status_.state = state_of(stage_);
+  return true;
+}
+
+/// A step that is an event.
+bool CalibrationSession::enter(SessionStep step, std::string reason, HostTime now) {
+  if (!go(step, now)) return false;
+  if (stage_ != SessionStage::Acquiring) status_.remaining.reset();
+  if (has_ended(stage_)) {
     status_.progress = 1.0;
     status_.next.reset();
+    not_stored_.clear();
     if (acquisition_) discarded_ = std::exchange(acquisition_, std::nullopt);
   }
+  add_event(std::move(reason), now);
+  return true;
+}
+
+/// Adds an event with a new reason.
+void CalibrationSession::add_event(std::string reason, HostTime now) {
+  status_.reason = std::move(reason);
   events_.push_back({now, status_});
 }
 

@@ -45,9 +45,9 @@ json request_json(std::uint64_t session, const std::shared_ptr<const std::string
 /// What the present or last session was asked for: the path, or the artefact.
 Result<OnHub> calibration(const HubParts&, const json&) {
   return [](const Hub& hub) -> Reply {
-    const CalibrationService& service = hub.parts().calibration;
-    return [session = service.status().id, text = service.request_text()] {
-      return request_json(session, text);
+    const CalibrationSession& session = hub.parts().calibration.session();
+    return [id = session.status().id, text = session.request_text()] {
+      return request_json(id, text);
     };
   };
 }
@@ -186,7 +186,7 @@ Result<OnHub> cancel(const HubParts&, const json& request) {
 SetDatumHere stand_here(const HubParts& parts, const std::vector<std::string>& axes, double u) {
   SetDatumHere here{.axes = axes, .u = u, .now = parts.time.now()};
   here.patience = parts.time.host(here.patience);
-  here.acquiring = takes_readings(parts.calibration.status().state);
+  here.acquiring = takes_readings(parts.calibration.session().status().state);
   return here;
 }
 
@@ -242,7 +242,7 @@ Result<OnHub> accept_sensor(const HubParts&, const json& request) {
     SensorAcceptance now = acceptance;
     now.from = on.time.now();
     return reply_done(on.sensors->accept(hub.live(), std::move(now),
-                                         takes_readings(on.calibration.status().state)));
+                                         takes_readings(on.calibration.session().status().state)));
   };
 }
 

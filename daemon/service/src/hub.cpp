@@ -48,8 +48,8 @@ StreamHealth health_of(const RecorderThread& recorder, std::chrono::nanoseconds 
 }
 
 /// Health of the model store: whether it can be read and written.
-StreamHealth health_of(const ModelAuthority& authority, const CalibrationService& calibration) {
-  const std::string& unstored = calibration.not_stored();
+StreamHealth health_of(const ModelAuthority& authority, const CalibrationSession& session) {
+  const std::string& unstored = session.not_stored();
   StreamHealth h;
   h.status.name = "models";
   h.status.connected = authority.fault().empty() && unstored.empty();
@@ -246,7 +246,7 @@ void Hub::collect_health(HostTime now) {
   add_findings(live_.sensor_findings(), health_);
   add_doubts(live_.sensor_doubts(), health_);
   missing_scales_ = live_.why_scales_alone_are_missing();
-  health_.push_back(health_of(parts_.authority, parts_.calibration));
+  health_.push_back(health_of(parts_.authority, parts_.calibration.session()));
   if (parts_.recorder != nullptr)
     health_.push_back(
         health_of(*parts_.recorder, parts_.config.recording.chunk_period, cycle_began_));

@@ -86,17 +86,16 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
   const CalibrationRun run = run_of(std::move(acquired));
   std::vector<InputFile> inputs = inputs_of(run);
   auto candidate = identify(run, *config, active ? &active->model : nullptr,
-                            {.progress = [this](double share) { state->share = share; },
-                             .stopped = [this] { return state->stopped.load(); }});
+                            {.progress = [this](double share) { link->share = share; },
+                             .stopped = [this] { return link->stopped.load(); }});
   ABBE_TRY(candidate);
 
-  RecordingDigest recording =
-      digest.valid() ? digest_of(digest, state->stopped) : RecordingDigest{};
+  RecordingDigest recording = digest.valid() ? digest_of(digest, link->stopped) : RecordingDigest{};
   cite(recording, inputs);
   const auto created = clock.now();
   auto document = document_of(*candidate, *config, std::move(inputs), created);
   document.recording_gap = std::move(recording.gap);
-  add_measured(document, observed(run), clock.offset(state->now));
+  add_measured(document, observed(run), clock.offset(link->now));
   auto id = model_id(document);
   auto why = fmt::format("calibrate {}", method_of(*candidate));
 
@@ -167,10 +166,10 @@ Result<KeptModel> IdentificationTask::operator()() {
   auto judged = judged_model();
   ABBE_TRY(judged);
   const std::shared_ptr<JudgedModel> model = std::move(*judged);
-  if (!state->begin_storing(model)) return fail(ErrorCode::Refused, "the model was discarded");
+  if (!link->begin_storing(model)) return fail(ErrorCode::Refused, "the model was discarded");
 
-  if (state->stopped) keeper.set_lock_timeout(CalibrationService::kLastTry);
-  return keeper.keep(model->document, model->verdict, model->actor, state->now, &model->discarded,
+  if (link->stopped) keeper.set_lock_timeout(CalibrationService::kLastTry);
+  return keeper.keep(model->document, model->verdict, model->actor, link->now, &model->discarded,
                      model->beside);
 }
 

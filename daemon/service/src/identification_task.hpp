@@ -27,9 +27,10 @@ struct JudgedModel {
   std::atomic<bool> discarded{false};  ///< the session was cancelled: do not store the model
 };
 
-/// State of an identification, shared by the hub's thread and the task, which may outlive the
-/// CalibrationService.
-class IdentificationState {
+/// Shared by the hub's thread and the task of an identification, which may outlive the
+/// CalibrationService. The state of the calibration is in CalibrationSession, to which the hub's
+/// thread reports what the task has reached.
+class IdentificationLink {
  public:
   std::atomic<double> share{0.0};  ///< progress of the identification, 0 to 1
   std::atomic<bool> stopped{false};
@@ -39,9 +40,9 @@ class IdentificationState {
   /// if the model is already discarded.
   [[nodiscard]] bool begin_storing(std::shared_ptr<JudgedModel> model) {
     model_ = std::move(model);
-    auto stage = Stage::Identifying;
+    auto first = First::Neither;
     // release: pairs with the acquire in take_model()
-    if (stage_.compare_exchange_strong(stage, Stage::Storing, std::memory_order_release))
+    if (first_.compare_exchange_strong(first, First::Storing, std::memory_order_release))
       return true;
     model_ = nullptr;  // here, because the hub's thread must not free a model
     return false;
@@ -49,26 +50,27 @@ class IdentificationState {
   /// For the hub: the model will not be stored when its identification ends. False if it is already
   /// being stored.
   [[nodiscard]] bool discard() noexcept {
-    auto stage = Stage::Identifying;
-    return stage_.compare_exchange_strong(stage, Stage::Discarded) || stage == Stage::Discarded;
+    auto first = First::Neither;
+    return first_.compare_exchange_strong(first, First::Discarded) || first == First::Discarded;
   }
   /// For the hub: returns the model, once, after begin_storing() returned true; before that null.
   [[nodiscard]] std::shared_ptr<JudgedModel> take_model() noexcept {
     // acquire: pairs with the release in begin_storing()
-    if (stage_.load(std::memory_order_acquire) != Stage::Storing) return nullptr;
+    if (first_.load(std::memory_order_acquire) != First::Storing) return nullptr;
     return std::exchange(model_, nullptr);
   }
 
  private:
-  enum class Stage : std::uint8_t { Identifying, Storing, Discarded };
-  std::atomic<Stage> stage_{Stage::Identifying};
+  /// Which of begin_storing() and discard() came first; decided once.
+  enum class First : std::uint8_t { Neither, Storing, Discarded };
+  std::atomic<First> first_{First::Neither};
   // owned by the task before begin_storing(), then by the hub
   std::shared_ptr<JudgedModel> model_;
 };
 
 /// Run it once, on an ordinary thread.
 struct IdentificationTask {
-  std::shared_ptr<IdentificationState> state;
+  std::shared_ptr<IdentificationLink> link;
   std::shared_ptr<const Config> config;
   Acquisition acquired;
   std::shared_ptr<const PublishedModel> active;  ///< the gate compares with it; may be null

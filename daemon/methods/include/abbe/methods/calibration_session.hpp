@@ -1,8 +1,8 @@
 #pragma once
-/// One calibration from the command to the verdict, as an explicit state machine. Its inputs are
-/// snapshots and the outcome of the identification, which the caller runs. It reads no clock and
-/// starts no thread, so that a live run and its replay pass through the same states at the same
-/// recorded instants.
+/// The state of the calibration sessions, in one place: stage, reason, method, number, request,
+/// model, times, and the sessions that ended before. Its inputs are snapshots and the outcome of the
+/// identification, which the caller runs and reports. It reads no clock and starts no thread, so
+/// that a live run and its replay pass through the same states at the same recorded instants.
 ///
 ///     idle --start--> warming --run begins--> acquiring --run complete--> identifying --+
 ///                        |                        |                            |        |
@@ -17,11 +17,17 @@
 ///          |
 ///          +-----gate failed--> refused
 ///
+/// These are the published states. session_stage.hpp has the table of all transitions, in which
+/// "identifying" is four stages.
+///
 /// The states are the same for every method; only the acquisition differs (OtfAcquisition,
 /// EvemuAcquisition, MfbAcquisition). If the method guides the operator from touch to touch, each
 /// new instruction is also an event. Not for the RT path; not thread-safe.
 
+#include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -31,8 +37,10 @@
 
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
+#include "abbe/calib/model/gate.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_run.hpp"
+#include "abbe/methods/session_stage.hpp"
 #include "abbe/pipeline/session_status.hpp"
 #include "abbe/protocol/samples.hpp"
 
@@ -44,6 +52,8 @@ using Acquisition = Methods::Acquisition;
 struct PreparedSession {
   std::string_view method;
   Acquisition acquisition;
+  /// The request as JSON, for clients that show it
+  std::shared_ptr<const std::string> request_text = {};
 };
 
 /// Converts a complete acquisition to the input of the identification. O(n) in points and vertices.
@@ -51,19 +61,26 @@ struct PreparedSession {
 
 class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted move of a variant
  public:
+  static constexpr std::size_t kEndedKept = 4;  ///< length of ended()
+
   /// `options`: one element for each method, in the order of Methods.
   explicit CalibrationSession(Methods::Options options = {}) : options_(std::move(options)) {}
 
   /// Checks a task and makes it ready for start(). BadInput for an invalid task. May be called from
   /// any thread, also while another thread uses the session.
   [[nodiscard]] Result<PreparedSession> prepare(CalibrationTask task) const;
-  /// Starts a session. Refused while another session is running. Afterwards `prepared` may hold
-  /// data of the previous session; the caller destroys it.
-  [[nodiscard]] Result<void> start(PreparedSession&& prepared, protocol::HostTime from);
-  /// prepare() and start().
+  /// Starts a session for the user `who`. Refused while another session is running, or the
+  /// identification of a cancelled one. Afterwards `prepared` may hold data of the previous
+  /// session; the caller destroys it.
+  [[nodiscard]] Result<void> start(PreparedSession&& prepared, std::string who,
+                                   protocol::HostTime from);
+  /// prepare() and start(), for a replay: no user.
   [[nodiscard]] Result<void> start(CalibrationRequest request);
-  /// Ends a running session as refused; what was acquired stays in the recording.
+  /// Ends a running session as refused; what was acquired stays in the recording. Refused without a
+  /// session, and while a model is being stored.
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
+  /// As cancel(), while a model is being stored and the store does not answer.
+  [[nodiscard]] Result<void> give_up_store(std::string who, protocol::HostTime now);
 
   void take(const protocol::Snapshot& snapshot);
   /// Fails the acquisition if no samples arrive any more; `now` is host time. Called in a live run
@@ -74,8 +91,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// the session is not acquiring, or its method has no such tables. Has no influence on the
   /// session.
   [[nodiscard]] std::optional<RunNews> take_news();
-  /// The acquired run, available in the state Identifying; nullopt in other states and after it was
-  /// returned once.
+  /// The acquired run of a complete session, returned once; nullopt in other stages. The caller
+  /// identifies the model and reports the outcome by the functions below.
   [[nodiscard]] std::optional<Acquisition> take_run();
   /// The acquisition of a refused session, returned once. The caller destroys it in the background,
   /// because destroying it may take long.
@@ -83,29 +100,68 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
     return std::exchange(discarded_, std::nullopt);
   }
 
-  /// Report the outcome of the identification: a model was judged, or none could be identified.
-  void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
+  /// None could be identified. If the session was cancelled meanwhile, another one can start.
   void not_identified(const Error& why, protocol::HostTime now);
-  /// Reports that the identified model could not be stored so far. Adds an event whenever `reason`
-  /// changes.
-  void not_stored(std::string reason, protocol::HostTime now);
+  /// A model is identified and judged; the caller stores it.
+  void identified(const calib::HeldOutFigures& held_out, protocol::HostTime now);
+  /// The model could not be stored. `fault` states why, `advice` what follows. Adds an event
+  /// whenever the text changes.
+  void store_failed(std::string fault, std::string_view advice, protocol::HostTime now);
+  /// The store does not answer. As store_failed(), but the caller still waits for the store.
+  void store_stalls(std::string fault, std::string_view advice, protocol::HostTime now);
+  /// After store_failed(): the caller stores the model again.
+  void store_again(protocol::HostTime now) { (void)go(SessionStep::StoreAgain, now); }
+  /// The model is stored with its verdict.
+  void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
 
+  [[nodiscard]] SessionStage stage() const noexcept { return stage_; }
+  /// Host time at which the stage began.
+  [[nodiscard]] protocol::HostTime since() const noexcept { return since_; }
+  [[nodiscard]] bool running() const noexcept {
+    return stage_ != SessionStage::Idle && !has_ended(stage_);
+  }
   [[nodiscard]] const SessionStatus& status() const noexcept { return status_; }
-  [[nodiscard]] bool running() const noexcept;
+  /// The user who started the present or last session.
+  [[nodiscard]] const std::string& who() const noexcept { return who_; }
+  /// The request of the present or last session as JSON; null before the first.
+  [[nodiscard]] const std::shared_ptr<const std::string>& request_text() const noexcept {
+    return request_text_;
+  }
+  /// The last kEndedKept sessions before the present one, oldest first, so that a client can still
+  /// read the verdict on its session.
+  [[nodiscard]] const std::deque<SessionStatus>& ended() const noexcept { return ended_; }
+  /// Why an identified model is not stored yet: "model 0123... is not stored: write ...: No space
+  /// left on device". Empty: there is no such model.
+  [[nodiscard]] const std::string& not_stored() const noexcept { return not_stored_; }
+  /// Held-out residuals of the last identified model, also of an earlier session; nullopt before
+  /// the first.
+  [[nodiscard]] const std::optional<calib::HeldOutFigures>& held_out() const noexcept {
+    return held_out_;
+  }
   /// Events since the last call, in order of time.
   [[nodiscard]] std::vector<SessionEvent> take_events();
 
  private:
-  [[nodiscard]] bool acquiring() const noexcept;
+  [[nodiscard]] bool acquiring() const noexcept { return takes_readings(status_.state); }
   void follow_acquisition(protocol::HostTime now);
   template <class Guided>
   void follow_guidance(Guided& acquisition, protocol::HostTime now);
-  void enter(SessionState state, std::string reason, protocol::HostTime now);
+  void report_not_stored(std::string fault, std::string_view advice, protocol::HostTime now);
+  bool go(SessionStep step, protocol::HostTime now);
+  bool enter(SessionStep step, std::string reason, protocol::HostTime now);
+  void add_event(std::string reason, protocol::HostTime now);
 
   Methods::Options options_;
   std::optional<Acquisition> acquisition_, discarded_;
+  SessionStage stage_ = SessionStage::Idle;  ///< changed by go() only
+  protocol::HostTime since_{};
   std::uint64_t started_ = 0;  ///< number of sessions started
   SessionStatus status_;
+  std::string who_;
+  std::shared_ptr<const std::string> request_text_;
+  std::string not_stored_;
+  std::optional<calib::HeldOutFigures> held_out_;
+  std::deque<SessionStatus> ended_;
   std::vector<SessionEvent> events_;
 };
 

@@ -1,7 +1,8 @@
 #pragma once
-/// Runs calibrations in the daemon: passes snapshots to the session and takes the result. One
-/// background task identifies the model, stores it with its verdict, activates it if the gate
-/// accepted it, and encodes it for publication.
+/// Runs calibrations in the daemon: passes snapshots to the session and reports the outcome of the
+/// identification to it. One background task identifies the model, stores it with its verdict,
+/// activates it if the gate accepted it, and encodes it for publication. The state of the
+/// calibration is in CalibrationSession; this class owns only the background task and its model.
 ///
 /// A model that cannot be stored (disk full, read-only, locked) stays in memory. Storing is tried
 /// again every five seconds, and the fault is reported, until the model is stored or its session is
@@ -11,13 +12,10 @@
 /// takes longer for a longer path, more points or a larger model: such work is done in prepare()
 /// and in the background task.
 
-#include <atomic>
 #include <chrono>
-#include <cstddef>
-#include <deque>
+#include <cstdint>
 #include <future>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,7 +29,7 @@
 
 namespace abbe::daemon {
 
-class IdentificationState;
+class IdentificationLink;
 struct JudgedModel;
 
 /// A calibration task that is checked and ready to start.
@@ -39,8 +37,6 @@ struct PreparedCalibration {
   PreparedSession session;
   RecordingAttachment attachment;  ///< the request, for the recording
   MethodNeeds needs;
-  /// The request as JSON, for clients that show it
-  std::shared_ptr<const std::string> request_text = {};
 };
 
 class CalibrationService {
@@ -56,7 +52,6 @@ class CalibrationService {
   /// The part of kStopTimeout for which the last attempt to store a model waits for the lock of the
   /// store.
   static constexpr std::chrono::seconds kLastTry{1};
-  static constexpr std::size_t kEndedKept = 4;  ///< length of ended()
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
 
@@ -85,34 +80,24 @@ class CalibrationService {
   std::vector<SessionEvent> cycle(std::span<const protocol::Snapshot> snapshots,
                                   protocol::HostTime now);
 
+  /// The state of the calibration.
+  [[nodiscard]] const CalibrationSession& session() const noexcept { return session_; }
+  /// CalibrationSession::status() with what the background tasks have reached: the progress of the
+  /// identification, and the tables of the run so far.
   [[nodiscard]] SessionStatus status() const;
   /// The source of dates. Any thread.
   [[nodiscard]] const WallClock& clock() const noexcept { return clock_; }
-  /// The request of the present or last session as JSON; null before the first.
-  [[nodiscard]] const std::shared_ptr<const std::string>& request_text() const noexcept {
-    return request_text_;
-  }
-  /// The last kEndedKept sessions before the present one, oldest first, so that a client can still
-  /// read the verdict on its session.
-  [[nodiscard]] const std::deque<SessionStatus>& ended() const noexcept { return ended_; }
-  /// Why an identified model is not stored yet: "model 0123... is not stored: write ...: No space
-  /// left on device". Empty: there is no such model.
-  [[nodiscard]] const std::string& not_stored() const noexcept { return not_stored_; }
-  /// Held-out residuals of the last identified model; nullopt before the first.
-  [[nodiscard]] const std::optional<calib::HeldOutFigures>& held_out() const noexcept {
-    return held_out_;
-  }
 
  private:
   using WallTime = std::chrono::steady_clock::time_point;
   [[nodiscard]] Result<void> check(const CalibrationTask& task) const;
-  void begin_identification(Acquisition acquired);
-  void follow_task(protocol::HostTime now);
+  void begin_identification(Acquisition acquired, protocol::HostTime now);
+  void follow_background(protocol::HostTime now);
+  bool take_model(protocol::HostTime now);
   void conclude(Result<KeptModel> kept, protocol::HostTime now);
   void store_in_background(ModelKeeper keeper, protocol::HostTime now);
-  void discard_unstored();
+  void discard_model();
   void report_stalled_store(protocol::HostTime now);
-  [[nodiscard]] bool storing() const;
   [[nodiscard]] bool store_stalls(protocol::HostTime now) const;
   [[nodiscard]] Result<void> store_before_end(WallTime until);
 
@@ -123,18 +108,10 @@ class CalibrationService {
   WallClock clock_;
   CalibrationSession session_;
   LiveTablesWatch live_tables_;
-  std::string who_;
-  std::shared_ptr<const std::string> request_text_;
-  std::future<Result<KeptModel>> task_;         // identifies and stores, or stores again
-  std::shared_ptr<IdentificationState> state_;  // of the last identification
-  std::shared_ptr<JudgedModel> to_keep_;        // shared with the thread that stores it
-  protocol::HostTime storing_from_{};
-  protocol::HostTime store_again_at_{};
-  std::string not_stored_;
+  std::future<Result<KeptModel>> task_;        // identifies and stores, or stores again
+  std::shared_ptr<IdentificationLink> link_;   // with the last identification
+  std::shared_ptr<JudgedModel> model_;         // to be stored; shared with the storing thread
   std::uint64_t revision_before_storing_ = 0;  // of the authority
-  std::deque<SessionStatus> ended_;
-  protocol::HostTime latest_cycle_{};
-  std::optional<calib::HeldOutFigures> held_out_;
 };
 
 }  // namespace abbe::daemon

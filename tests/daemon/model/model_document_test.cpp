@@ -1,5 +1,6 @@
 #include "abbe/model/model_document.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <array>

@@ -79,20 +79,20 @@ py::dict lengths_of(const calib::VectorStatistics& s) {
 
 py::dict verify(const daemon::VerifyArguments& arguments) {
   std::optional<daemon::Error> cut_short;
-  const auto outcome = without_lock([&] {
-    auto verified = verify_model(arguments, cut_short, daemon::Progress{});
+  const auto v = without_lock([&] {
+    auto verified = verify_models(arguments, cut_short, daemon::Progress{});
     if (!verified && cut_short) verified.error().details.push_back(cut_short->text);
     return verified;
   });
-  const auto& v = outcome.verification;
+  const auto& one = v.models.front();
   py::dict out;
-  out["effect"] = daemon::effect_name(calib::verify::effect_at_points(v.comparison));
+  out["effect"] = daemon::effect_name(calib::verify::effect_at_points(one.comparison));
   out["places"] = v.observations.shots.size();
-  out["inside"] = v.comparison.inside.size();
-  out["before"] = lengths_of(v.comparison.before);
-  out["after"] = lengths_of(v.comparison.after);
-  out["cautions"] = v.cautions;
-  out["points_off"] = outcome.points_off;
+  out["inside"] = v.inside;
+  out["before"] = lengths_of(one.comparison.before);
+  out["after"] = lengths_of(one.comparison.after);
+  out["cautions"] = one.model.cautions;
+  out["points_off"] = v.points_off;
   out["cut_short"] = v.cut_short;
   return out;
 }

@@ -37,11 +37,7 @@ void add_export(CLI::App& parent, int& exit) {
       "with what the format can hold; only then it gets its name. The report states the sign, and\n"
       "in um what the format loses. A model that must not be used (refused by the gate,\n"
       "drifted; with -c also one of another machine configuration) is refused, unless --force.");
-  command
-      ->add_option("MODEL", arguments->model,
-                   "model.json; or a model of the store: its id, the beginning of its id, or "
-                   "\"active\"")
-      ->required();
+  command->add_option("MODEL", arguments->model, kModelText)->required();
   add_store_options(*command, arguments->store);
   command->add_option("--to", arguments->to, "format: " + format_names())->required();
   command

@@ -1,11 +1,15 @@
 #pragma once
-/// Statistics in the format of --json.
+/// Statistics of vectors in the format of --json and as rows of a table.
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
-#include "abbe/calib/verify/observe.hpp"
 
 namespace abbe::daemon {
 
@@ -15,9 +19,28 @@ namespace abbe::daemon {
           {"max_um", s.max_m * kUmPerM}};
 }
 
-/// null: no place was measured twice.
-[[nodiscard]] inline nlohmann::json repeatability_figure(const calib::verify::Observations& o) {
-  return o.repeatability_m ? nlohmann::json(kUmPerM * *o.repeatability_m) : nlohmann::json();
+/// `value` in the unit of which `per_si` are one SI unit; null if there is none.
+[[nodiscard]] inline nlohmann::json figure_or_null(double per_si,
+                                                   const std::optional<double>& value) {
+  return value ? nlohmann::json(per_si * *value) : nlohmann::json();
+}
+
+/// Widths of the columns.
+struct VectorColumns {
+  int name = 0, figure = 0;
+};
+
+[[nodiscard]] inline std::string vector_heading(std::string_view name, const VectorColumns& width) {
+  return fmt::format("{:<{}}  {:>{}}  {:>{}}  {:>{}}", name, width.name, "mean", width.figure,
+                     "rms", width.figure, "largest", width.figure);
+}
+
+/// In um, with three decimals.
+[[nodiscard]] inline std::string vector_row(std::string_view name, const calib::VectorStatistics& s,
+                                            const VectorColumns& width) {
+  return fmt::format("{:<{}}  {:>{}.3f}  {:>{}.3f}  {:>{}.3f}", name, width.name,
+                     kUmPerM * s.mean_m, width.figure, kUmPerM * s.rms_m, width.figure,
+                     kUmPerM * s.max_m, width.figure);
 }
 
 }  // namespace abbe::daemon

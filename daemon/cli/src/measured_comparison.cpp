@@ -40,7 +40,7 @@ const char* unit_of(const direct::TableComparison& table) {
 json reversal_json(const std::optional<direct::Reversal>& reversal) {
   if (!reversal) return {};
   return {{"mean", kUmPerM * reversal->mean},
-          {"u", reversal->u ? json(kUmPerM * *reversal->u) : json()},
+          {"u", figure_or_null(kUmPerM, reversal->u)},
           {"largest", kUmPerM * reversal->largest},
           {"largest_at_mm", kMmPerM * reversal->at_m}};
 }
@@ -99,22 +99,21 @@ json volume_json(const calib::Result<direct::VolumeComparison>& volume) {
           {"model", vector_figures(volume->V_model)},
           {"as_stated", vector_figures(volume->difference.as_stated)},
           {"rigid_free", vector_figures(volume->difference.rigid_free)},
-          {"u_rms_um", volume->u_rms_m ? json(kUmPerM * *volume->u_rms_m) : json()}};
+          {"u_rms_um", figure_or_null(kUmPerM, volume->u_rms_m)}};
 }
 
-void print_measured_json(const MeasuredComparison& found, const MeasuredOptions& options) {
-  json object{
-      {"measured", found.file.source.name},
-      {"sha256", found.file.source.sha256},
-      {"straightness", options.straightness},
-      {"tool_mm",
-       {kMmPerM * found.tool_m.x(), kMmPerM * found.tool_m.y(), kMmPerM * found.tool_m.z()}},
-      {"rows_off", found.rows_off},
-      {"tables_tested", std::ranges::count_if(found.tables, is_tested)},
-      {"tables", json::array()},
-      {"volume", volume_json(found.volume)}};
+json measured_json(const MeasuredComparison& found, const MeasuredOptions& options) {
+  const auto& tool_m = found.tool_m;
+  json object{{"measured", found.file.source.name},
+              {"sha256", found.file.source.sha256},
+              {"straightness", options.straightness},
+              {"tool_mm", {kMmPerM * tool_m.x(), kMmPerM * tool_m.y(), kMmPerM * tool_m.z()}},
+              {"rows_off", found.rows_off},
+              {"tables_tested", std::ranges::count_if(found.tables, is_tested)},
+              {"tables", json::array()},
+              {"volume", volume_json(found.volume)}};
   for (const auto& table : found.tables) object["tables"].push_back(table_json(table));
-  fmt::print("{}\n", indented_json_text(object));
+  return object;
 }
 
 // Text.
@@ -169,11 +168,6 @@ void print_conventions(const MeasuredComparison& found) {
     fmt::print("{}  ({})\n", text, fmt::join(tables, ", "));
 }
 
-void print_vectors(const char* what, const calib::VectorStatistics& s) {
-  fmt::print("{:<32}  {:>8.3f}  {:>8.3f}  {:>8.3f}\n", what, kUmPerM * s.mean_m, kUmPerM * s.rms_m,
-             kUmPerM * s.max_m);
-}
-
 void print_volume(const calib::Result<direct::VolumeComparison>& volume) {
   if (!volume) return fmt::print("\nin the volume: {}\n", volume.error().text);
   fmt::print("\n|V| at {} places, from {}, um\n", volume->points,
@@ -182,11 +176,15 @@ void print_volume(const calib::Result<direct::VolumeComparison>& volume) {
     fmt::print("left out of both: {} (not measured)\n", fmt::join(volume->not_measured, ", "));
   for (const auto& [name, reason] : volume->left_out)
     fmt::print("left out of both: {} ({})\n", name, reason);
-  fmt::print("{:<32}  {:>8}  {:>8}  {:>8}\n", "", "mean", "rms", "largest");
-  print_vectors("measured", volume->V_measured);
-  print_vectors("model", volume->V_model);
-  print_vectors("difference as stated", volume->difference.as_stated);
-  print_vectors("difference without rigid motion", volume->difference.rigid_free);
+  constexpr VectorColumns kVolume{.name = 32, .figure = 8};
+  fmt::print("{}\n", vector_heading("", kVolume));
+  const auto row = [&](const char* what, const calib::VectorStatistics& vectors) {
+    fmt::print("{}\n", vector_row(what, vectors, kVolume));
+  };
+  row("measured", volume->V_measured);
+  row("model", volume->V_model);
+  row("difference as stated", volume->difference.as_stated);
+  row("difference without rigid motion", volume->difference.rigid_free);
   if (volume->u_rms_m)
     fmt::print("{:<32}  {:>8}  {:>8.3f}\n", "standard uncertainty, as stated", "",
                kUmPerM * *volume->u_rms_m);
@@ -249,10 +247,13 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
 }
 
 Result<int> compare_with_measured(const calib::VolumetricModel& model,
-                                  const MeasuredOptions& options, bool json) {
+                                  const MeasuredOptions& options, bool as_json) {
   const auto found = compare_measured(model, options);
   ABBE_TRY(found);
-  json ? print_measured_json(*found, options) : print_measured_text(*found);
+  if (as_json)
+    fmt::print("{}\n", indented_json_text(measured_json(*found, options)));
+  else
+    print_measured_text(*found);
 
   if (any_with(*found, direct::Finding::Contradicts)) return exit_code(ErrorCode::Refused);
   const bool tested = any_with(*found, direct::Finding::Agrees);

@@ -8,7 +8,7 @@
 
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/printable.hpp"
-#include "abbe/base/units.hpp"
+#include "abbe/result/try.hpp"
 #include "abbe/tasks/compare_models.hpp"
 #include "commands.hpp"
 #include "figures.hpp"
@@ -25,45 +25,42 @@ struct CompareCommand : CompareModelsArguments {
   bool json = false;
 };
 
-void print(const char* what, const calib::VectorStatistics& s) {
-  fmt::print("{:<24}  {:>9.3f}  {:>9.3f}  {:>9.3f}\n", what, s.mean_m * kUmPerM, s.rms_m * kUmPerM,
-             s.max_m * kUmPerM);
+nlohmann::json models_json(const ModelsComparison& found) {
+  return {{"points", found.points},
+          {"as_stated", vector_figures(found.difference.as_stated)},
+          {"rigid_free", vector_figures(found.difference.rigid_free)},
+          {"machine_a", found.a.machine},
+          {"machine_b", found.b.machine},
+          {"cautions_a", found.a.cautions},
+          {"cautions_b", found.b.cautions}};
 }
 
-int run_measured(const CompareCommand& arguments) {
-  const auto found = found_model(arguments.a, arguments.store);
-  if (!found) return report(found.error());
-  print_cautions(arguments.a, *found);
-  const auto exit =
-      compare_with_measured(found->document.model, arguments.measured, arguments.json);
-  return exit ? *exit : report(exit.error());
+void print_models(const ModelsComparison& found) {
+  constexpr VectorColumns kDifference{.name = 24, .figure = 9};
+  if (!found.different_machines.empty()) fmt::print("{}\n", found.different_machines);
+  for (const auto& caution : found.a.cautions) fmt::print("A: {}\n", printable_line(caution));
+  for (const auto& caution : found.b.cautions) fmt::print("B: {}\n", printable_line(caution));
+  fmt::print("|V(A) - V(B)| at {} nodes where both are valid, um\n", found.points);
+  fmt::print("{}\n", vector_heading("", kDifference));
+  fmt::print("{}\n", vector_row("as stated", found.difference.as_stated, kDifference));
+  fmt::print("{}\n",
+             vector_row("without a rigid motion", found.difference.rigid_free, kDifference));
 }
 
-int run(const CompareCommand& arguments) {
-  const auto found = compare_models(arguments);
-  if (!found) return report(found.error());
-  const auto& d = found->difference;
-
-  if (arguments.json) {
-    const nlohmann::json object{{"points", found->points},
-                                {"as_stated", vector_figures(d.as_stated)},
-                                {"rigid_free", vector_figures(d.rigid_free)},
-                                {"machine_a", found->machine_a},
-                                {"machine_b", found->machine_b},
-                                {"cautions_a", found->cautions_a},
-                                {"cautions_b", found->cautions_b}};
-    fmt::print("{}\n", indented_json_text(object));
-    return 0;
+/// The exit code.
+Result<int> compare(const CompareCommand& arguments) {
+  if (!arguments.measured.file.empty()) {
+    const auto model = found_model(arguments.a, arguments.store);
+    ABBE_TRY(model);
+    print_cautions(arguments.a, *model);
+    return compare_with_measured(model->document.model, arguments.measured, arguments.json);
   }
-
-  if (!found->different_machines.empty()) fmt::print("{}\n", found->different_machines);
-  for (const auto& caution : found->cautions_a) fmt::print("A: {}\n", printable_line(caution));
-  for (const auto& caution : found->cautions_b) fmt::print("B: {}\n", printable_line(caution));
-  fmt::print("|V(A) - V(B)| at {} nodes where both are valid, um\n", found->points);
-  fmt::print("{:<24}  {:>9}  {:>9}  {:>9}\n", "", "mean", "rms", "largest");
-  print("as stated", d.as_stated);
-  print("without a rigid motion", d.rigid_free);
-
+  const auto found = compare_models(arguments);
+  ABBE_TRY(found);
+  if (arguments.json)
+    fmt::print("{}\n", indented_json_text(models_json(*found)));
+  else
+    print_models(*found);
   return 0;
 }
 
@@ -79,11 +76,7 @@ void add_model_compare(CLI::App& parent, int& exit) {
       "--other-machine.\nWith --measured FILE instead of B: the difference of directly measured "
       "error "
       "motions and A.");
-  command
-      ->add_option("A", arguments->a,
-                   "model.json; or a model of the store: its id, the beginning of its id, or "
-                   "\"active\"")
-      ->required();
+  command->add_option("A", arguments->a, kModelText)->required();
   auto* b = command->add_option("B", arguments->b, "the other model, given like A");
   auto* measured = add_measured_options(*command, arguments->measured);
   measured->excludes(b);
@@ -96,12 +89,8 @@ void add_model_compare(CLI::App& parent, int& exit) {
   add_other_machine_option(*command, arguments->other_machine);
   command->add_flag("--json", arguments->json, "print one JSON object");
   command->callback([arguments, &exit] {
-    if (!arguments->measured.file.empty())
-      exit = run_measured(*arguments);
-    else if (arguments->b.empty())
-      exit = report({ErrorCode::Usage, "model compare: give a second model B, or --measured"});
-    else
-      exit = run(*arguments);
+    const auto code = compare(*arguments);
+    exit = code ? *code : report(code.error());
   });
 }
 

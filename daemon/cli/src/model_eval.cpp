@@ -116,11 +116,7 @@ void add_model_eval(CLI::App& parent, int& exit) {
                             "e = actual - nominal at the scale reading; u: its standard "
                             "uncertainty (k = 1) in the model's gauge;\n"
                             "inside: 1 if the position is in the validity volume of the model.");
-  command
-      ->add_option("MODEL", arguments->model,
-                   "model.json; or a model of the store: its id, the beginning of its id, or "
-                   "\"active\"")
-      ->required();
+  command->add_option("MODEL", arguments->model, kModelText)->required();
   add_store_options(*command, arguments->store);
   command
       ->add_option("--points", arguments->points,

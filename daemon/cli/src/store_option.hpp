@@ -8,6 +8,10 @@
 
 namespace abbe::daemon {
 
+/// What a command takes as a model, for its help.
+inline constexpr const char* kModelText =
+    "model.json; or a model of the store: its id, the beginning of its id, or \"active\"";
+
 void add_store_options(CLI::App& command, StoreOption& where);
 /// Prints cautions_of() to stderr.
 void print_cautions(const std::string& name, const FoundModel& model);

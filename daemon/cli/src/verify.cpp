@@ -7,7 +7,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <string_view>
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
@@ -15,9 +14,8 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/result/try.hpp"
-#include "abbe/tables/input_files.hpp"
 #include "abbe/tasks/effect_name.hpp"
-#include "abbe/tasks/verification_report.hpp"
+#include "abbe/tasks/verify.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "figures.hpp"
@@ -25,12 +23,12 @@
 #include "store_option.hpp"
 #include "terminal.hpp"
 #include "verification_points.hpp"
-#include "verify_several.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace verify = calib::verify;
+using nlohmann::json;
 
 struct VerifyCommand : VerifyArguments {
   std::string socket = DaemonSocket{}.socket;
@@ -50,7 +48,22 @@ void measure_live(VerifyCommand& arguments) {
   };
 }
 
-nlohmann::json figures(const verify::RatioStatistics& s) {
+constexpr VectorColumns kModels{.name = 32, .figure = 9};
+
+const char* effect_of(const ModelAtPoints& one) {
+  return effect_name(verify::effect_at_points(one.comparison));
+}
+
+json model_json(const ModelAtPoints& one) {
+  return {{"model", model_id(one.model.document)},
+          {"machine", one.model.machine},
+          {"cautions", one.model.cautions},
+          {"effect", effect_of(one)},
+          {"before", vector_figures(one.comparison.before)},
+          {"after", vector_figures(one.comparison.after)}};
+}
+
+json ratio_json(const verify::RatioStatistics& s) {
   return {{"count", s.count},
           {"mean", s.mean},
           {"std", s.standard_deviation},
@@ -63,34 +76,34 @@ nlohmann::json figures(const verify::RatioStatistics& s) {
           {"share_above_1", static_cast<double>(s.above_1) / static_cast<double>(s.count)}};
 }
 
-void print_json(const VerifyOutcome& outcome) {
-  const auto& c = outcome.verification.comparison;
-  const auto& o = outcome.verification.observations;
-  const auto& turned = c.turned;
-  nlohmann::json object{
-      {"effect", effect_name(verify::effect_at_points(c))},
-      {"model", model_id(outcome.document)},
-      {"cautions", outcome.verification.cautions},
-      {"machine", outcome.machine},
-      {"points", o.shot_count()},
-      {"places", o.shots.size()},
-      {"inside", c.inside.size()},
-      {"repeatability_um", repeatability_figure(o)},
-      {"before", vector_figures(c.before)},
-      {"after", vector_figures(c.after)},
-      {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},
-      {"interpolation_rms_um", kUmPerM * c.interpolation_rms_m},
-      {"cut_short", outcome.verification.cut_short},
-      {"points_off", outcome.points_off}};
-
+/// What only one model has.
+json one_json(const Verification& v) {
+  const auto& c = v.comparison();
+  json object = model_json(v.models.front());
+  object["inside"] = v.inside;
+  object["turned_urad"] = {kUradPerRad * c.turned(3), kUradPerRad * c.turned(4),
+                           kUradPerRad * c.turned(5)};
+  object["interpolation_rms_um"] = kUmPerM * c.interpolation_rms_m;
+  object["cut_short"] = v.cut_short;
+  object["points_off"] = v.points_off;
   if (const auto why = why_no_ratio(c)) {
     object["R_not_given"] = *why;
   } else {
-    object["R_turned"] = figures(c.R_turned);
-    object["R_stated"] = figures(c.R_stated);
+    object["R_turned"] = ratio_json(c.R_turned);
+    object["R_stated"] = ratio_json(c.R_stated);
   }
+  return object;
+}
 
-  fmt::print("{}\n", indented_json_text(object));
+json several_json(const Verification& v) {
+  json object{{"inside_all", v.inside},
+              {"different_machines", v.different_machines},
+              {"models", json::array()}};
+  for (const ModelAtPoints& one : v.models) {
+    object["models"].push_back(model_json(one));
+    object["models"].back()["name"] = one.model.name;
+  }
+  return object;
 }
 
 void print_ratio(const char* what, const verify::RatioStatistics& s) {
@@ -109,85 +122,94 @@ void print_ratios(const verify::Comparison& c) {
              kUmPerM * c.interpolation_rms_m);
 }
 
-void print_summary(const VerifyOutcome& outcome, const VerifyCommand& arguments) {
-  const auto& v = outcome.verification;
-  const auto& c = v.comparison;
+void print_one(const Verification& v) {
+  const auto& c = v.comparison();
+  const auto& document = v.models.front().model.document;
   fmt::print("verdict     {}\n", verdict_text(c));
-  for (const auto& line : outcome.points_off) fmt::print("one point   {}\n", line);
-  fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document),
-             printable_line(outcome.document.machine), outcome.document.method);
-  for (const std::string& caution : v.cautions)
+  for (const auto& line : v.points_off) fmt::print("one point   {}\n", line);
+  fmt::print("model       {}  (machine \"{}\", {})\n", model_id(document),
+             printable_line(document.machine), document.method);
+  for (const std::string& caution : v.models.front().model.cautions)
     fmt::print("caution     {}\n", printable_line(caution));
   fmt::print("points      {}; {} of these places where the model is valid\n",
-             shots_text(v.observations), c.inside.size());
+             shots_text(v.observations), v.inside);
   fmt::print(
       "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with "
       "the model\n",
       kUmPerM * c.before.rms_m, kUmPerM * c.before.max_m, kUmPerM * c.after.rms_m,
       kUmPerM * c.after.max_m);
   fmt::print("frame       {}; model turned by {:.1f}, {:.1f}, {:.1f} urad\n",
-             arguments.frame == "fit"
+             v.observations.frame == verify::Frame::BestFit
                  ? "fitted to the readings: the best-fit rigid motion of V is not observable"
                  : "the machine's axes",
              kUradPerRad * c.turned(3), kUradPerRad * c.turned(4), kUradPerRad * c.turned(5));
   print_ratios(c);
+}
 
-  if (!arguments.out.empty())
+void print_several(const Verification& v) {
+  if (!v.different_machines.empty()) fmt::print("{}\n", v.different_machines);
+  fmt::print("residual errors at {} of {} places, where all models are valid, um\n", v.inside,
+             v.observations.shots.size());
+  if (v.observations.repeatability_m) fmt::print("{}\n", shots_text(v.observations));
+  fmt::print("{}  effect\n", vector_heading("model", kModels));
+  fmt::print("{}  \n", vector_row("without a model", v.comparison().before, kModels));
+  for (const ModelAtPoints& one : v.models)
+    fmt::print("{}  {}\n",
+               vector_row(printable_line(one.model.name), one.comparison.after, kModels),
+               effect_of(one));
+  for (const ModelAtPoints& one : v.models)
+    for (const std::string& caution : one.model.cautions)
+      fmt::print("{}: {}\n", printable_line(one.model.name), printable_line(caution));
+}
+
+json verification_json(const Verification& v) {
+  json object = v.models.size() > 1 ? several_json(v) : one_json(v);
+  object["points"] = v.observations.shot_count();
+  object["places"] = v.observations.shots.size();
+  object["repeatability_um"] = figure_or_null(kUmPerM, v.observations.repeatability_m);
+  return object;
+}
+
+/// report.html and grid.csv, of one model.
+Result<void> write_outputs(const std::filesystem::path& folder, const Verification& v) {
+  if (folder.empty() || v.models.size() > 1) return {};
+  ABBE_TRY(create_folder(folder));
+  ABBE_TRY(replace_file(folder / "grid.csv", to_grid_csv(v.comparison())));
+  return replace_file(folder / "report.html", verification_report(v));
+}
+
+void print(const Verification& v, const VerifyCommand& arguments) {
+  if (arguments.json) return fmt::print("{}\n", indented_json_text(verification_json(v)));
+  v.models.size() > 1 ? print_several(v) : print_one(v);
+  if (!arguments.out.empty() && v.models.size() == 1)
     fmt::print("written     {}, grid.csv\n",
                (std::filesystem::path(arguments.out) / "report.html").string());
 }
 
-Result<void> write_outputs(const std::filesystem::path& folder, const VerifyOutcome& outcome) {
-  if (folder.empty()) return {};
-  ABBE_TRY(create_folder(folder));
-  ABBE_TRY(replace_file(folder / "grid.csv", to_grid_csv(outcome.verification.comparison)));
-  return replace_file(folder / "report.html",
-                      verification_report(outcome.document, outcome.verification));
-}
-
-bool is_worse(const VerifyOutcome& outcome) {
-  return verify::effect_at_points(outcome.verification.comparison) == verify::Effect::Worse;
-}
-
-bool is_worse(const SeveralOutcome& outcome) {
-  return std::ranges::any_of(outcome.models, [](const ModelAtPoints& one) {
-    return verify::effect_at_points(one.comparison) == verify::Effect::Worse;
-  });
-}
-
-Result<void> show(const VerifyOutcome& outcome, const VerifyCommand& arguments) {
-  ABBE_TRY(write_outputs(arguments.out, outcome));
-  arguments.json ? print_json(outcome) : print_summary(outcome, arguments);
-  return {};
-}
-
-Result<void> show(const SeveralOutcome& outcome, const VerifyCommand& arguments) {
-  arguments.json ? print_json(outcome) : print_summary(outcome);
-  return {};
-}
-
-/// `task`: verify_model() or verify_several().
-template <class Task>
-int run(const VerifyCommand& arguments, const Task& task) {
+int run(const VerifyCommand& arguments) {
   std::optional<Error> cut_short;
   ProgressBar bar;
-  const auto outcome = task(arguments, cut_short, bar.progress());
+  const auto found = verify_models(arguments, cut_short, bar.progress());
   bar.clear();
-  if (!outcome) {
-    const int code = report(outcome.error());
+  if (!found) {
+    const int code = report(found.error());
     return cut_short ? report(*cut_short) : code;
   }
-  if (const auto shown = show(*outcome, arguments); !shown) return report(shown.error());
+  if (const auto written = write_outputs(arguments.out, *found); !written)
+    return report(written.error());
+  print(*found, arguments);
   if (cut_short) return report(*cut_short);
-  return number(is_worse(*outcome) ? ExitCode::Worse : ExitCode::Done);
+  const bool worse = std::ranges::any_of(found->models, [](const ModelAtPoints& one) {
+    return verify::effect_at_points(one.comparison) == verify::Effect::Worse;
+  });
+  return number(worse ? ExitCode::Worse : ExitCode::Done);
 }
 
 void add_options(CLI::App& command, VerifyCommand& arguments) {
   command
       .add_option("MODEL", arguments.models,
-                  "model.json; or a model of the store: its id, the beginning of its id, or "
-                  "\"active\";\nseveral: only the table of their residuals at the same "
-                  "points")
+                  std::string(kModelText) +
+                      ";\nseveral: only the table of their residuals at the same points")
       ->required();
   add_store_options(command, arguments.store);
   auto* points = command.add_option(
@@ -256,8 +278,7 @@ void add_verify(CLI::App& parent, int& exit) {
 
   command->callback([arguments, &exit] {
     measure_live(*arguments);
-    exit = arguments->models.size() > 1 ? run(*arguments, verify_several)
-                                        : run(*arguments, verify_model);
+    exit = run(*arguments);
   });
 }
 

@@ -7,7 +7,6 @@
 
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/direction_option.hpp"
-#include "abbe/tasks/same_machine.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -27,29 +26,30 @@ std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
 }  // namespace
 
 Result<ModelsComparison> compare_models(const CompareModelsArguments& arguments) {
-  const auto found_a = found_model(arguments.a, arguments.store);
-  ABBE_TRY(found_a);
-  const auto found_b = found_model(arguments.b, arguments.store);
-  ABBE_TRY(found_b);
-  const std::array machines{of_machine(arguments.a, *found_a), of_machine(arguments.b, *found_b)};
+  if (arguments.b.empty())
+    return fail(ErrorCode::Usage, "model compare: give a second model B, or --measured");
+  auto a = compared_model(arguments.a, arguments.store);
+  ABBE_TRY(a);
+  auto b = compared_model(arguments.b, arguments.store);
+  ABBE_TRY(b);
+  const std::array machines{OfMachine{a->name, a->machine}, OfMachine{b->name, b->machine}};
   auto different = require_same_machine("model compare", machines, arguments.other_machine);
   ABBE_TRY(different);
-  const ModelDocument *const a = &found_a->document, *const b = &found_b->document;
+  const auto &model_a = a->document.model, &model_b = b->document.model;
 
   const auto travel = parse_direction(arguments.direction);
   ABBE_TRY(travel);
-  if (!arguments.direction.empty() && b->model.travel() == nullptr) {
-    ABBE_TRY(require_travel(a->model, arguments.a));
+  if (!arguments.direction.empty() && model_b.travel() == nullptr) {
+    ABBE_TRY(require_travel(model_a, arguments.a));
   }
 
-  const auto points = common_points(a->model, b->model);
+  const auto points = common_points(model_a, model_b);
   const auto difference = calib::rigid_free_difference(
-      a->model, b->model, a->model.tool_offsets_m().front(), points, *travel);
+      model_a, model_b, model_a.tool_offsets_m().front(), points, *travel);
   if (!difference)
     return fail(ErrorCode::DataInsufficient,
                 fmt::format("{} and {}: {}", arguments.a, arguments.b, difference.error().text));
-  return ModelsComparison{points.size(),         *difference,         cautions_of(*found_a),
-                          cautions_of(*found_b), machines[0].machine, machines[1].machine,
+  return ModelsComparison{*std::move(a), *std::move(b), points.size(), *difference,
                           *std::move(different)};
 }
 

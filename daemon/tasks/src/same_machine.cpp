@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "abbe/base/printable.hpp"
 #include "abbe/model/machine_identity.hpp"
+#include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
 
@@ -32,6 +34,14 @@ Result<std::string> require_same_machine(const std::string& command,
     return fail(ErrorCode::Usage,
                 fmt::format("{}: {}; if this is meant, give --other-machine", command, different));
   return different;
+}
+
+Result<ComparedModel> compared_model(const std::string& name, const StoreOption& where) {
+  auto found = found_model(name, where);
+  ABBE_TRY(found);
+  auto cautions = cautions_of(*found);
+  auto machine = of_machine(name, *found).machine;
+  return ComparedModel{name, std::move(found->document), std::move(cautions), std::move(machine)};
 }
 
 }  // namespace abbe::daemon

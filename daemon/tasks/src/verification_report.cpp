@@ -55,12 +55,13 @@ std::size_t places_improved(const verify::Comparison& c) {
 
 void add_verdict(HtmlReport& page, const Verification& v) {
   page.heading("Verdict");
-  page.paragraph(verdict_text(v.comparison) + ".");
-  for (const std::string& caution : v.cautions) page.paragraph("Of the model: " + caution + ".");
+  page.paragraph(verdict_text(v.comparison()) + ".");
+  for (const std::string& caution : v.models.front().model.cautions)
+    page.paragraph("Of the model: " + caution + ".");
 }
 
 void add_left(HtmlReport& page, const Verification& v) {
-  const auto& c = v.comparison;
+  const auto& c = v.comparison();
   page.heading("Residuals at the measured places");
   if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
   page.paragraph(fmt::format(
@@ -98,7 +99,7 @@ std::string place_text(const Verification& v, std::size_t place) {
 /// file, for example after the beam was interrupted.
 void add_farthest(HtmlReport& page, const Verification& v) {
   constexpr std::size_t kShown = 5;
-  const auto& c = v.comparison;
+  const auto& c = v.comparison();
   std::vector<std::size_t> order(c.inside.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto shown = static_cast<std::ptrdiff_t>(std::min(kShown, order.size()));
@@ -120,7 +121,7 @@ void add_farthest(HtmlReport& page, const Verification& v) {
 
 void add_frame(HtmlReport& page, const Verification& v) {
   const auto& o = v.observations;
-  const auto& c = v.comparison;
+  const auto& c = v.comparison();
   page.heading("Frames");
   page.paragraph(
       o.frame == verify::Frame::BestFit
@@ -235,7 +236,7 @@ void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double 
 /// Adds charts of measured vectors, model and residual in planes normal to z, x and y, as in Fig.
 /// 12 of [Li OMM].
 void add_planes(HtmlReport& page, const Verification& v) {
-  const auto& c = v.comparison;
+  const auto& c = v.comparison();
   calib::Vector3 low = c.grid.front().q_m, high = low;
   double longest_m = 1e-9;
 
@@ -289,12 +290,13 @@ std::optional<std::string> why_no_ratio(const verify::Comparison& c) {
       kUmPerM * c.interpolation_rms_m, kUmPerM * c.after.rms_m);
 }
 
-std::string verification_report(const ModelDocument& document, const Verification& v) {
+std::string verification_report(const Verification& v) {
+  const ModelDocument& document = v.models.front().model.document;
   HtmlReport page(fmt::format("{}: verification of a model", document.machine));
   add_verdict(page, v);
   add_left(page, v);
   add_farthest(page, v);
-  add_ratio(page, v.comparison);
+  add_ratio(page, v.comparison());
   add_planes(page, v);
   add_frame(page, v);
   add_model_origin(page, document, v.inputs);

@@ -17,6 +17,32 @@ namespace {
 
 namespace verify = calib::verify;
 
+/// Usage for an argument that has no effect with several models. With `live`, `out` is the folder
+/// of the measured points.
+Result<void> check_several(const VerifyArguments& arguments) {
+  const auto only_one = [](std::string_view name) -> Result<void> {
+    return fail(ErrorCode::Usage, fmt::format("verify: {} is for one model; give one", name));
+  };
+  if (!arguments.out.empty() && !arguments.live) return only_one("-o (report.html, grid.csv)");
+  if (!arguments.origin.empty()) return only_one("--origin-mm");
+  if (!arguments.grid.empty()) return only_one("--grid-mm");
+  if (!arguments.planes.empty()) return only_one("--planes-mm");
+  if (arguments.least_distance_mm) return only_one("--least-distance-mm");
+  return {};
+}
+
+/// Usage unless there is a model and one kind of points, and for points of the running machine also
+/// a folder to keep them.
+Result<void> check_verify(const VerifyArguments& arguments) {
+  if (arguments.models.empty()) return fail(ErrorCode::Usage, "verify: give a model");
+  const int given =
+      !arguments.points.empty() + !arguments.recording.empty() + (arguments.live ? 1 : 0);
+  if (given != 1) return fail(ErrorCode::Usage, "verify: give --points, --recording or --live");
+  if (arguments.live && arguments.out.empty())
+    return fail(ErrorCode::Usage, "verify --live: -o is required: the points are saved there");
+  return arguments.models.size() > 1 ? check_several(arguments) : Result<void>{};
+}
+
 Result<verify::Options> options_of(const VerifyArguments& arguments) {
   verify::Options options;
   if (!arguments.origin.empty()) {
@@ -39,71 +65,128 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
   return options;
 }
 
+/// Usage if the tool offsets differ: the points were measured with one.
+Result<void> check_tools(const std::vector<ModelAtPoints>& models) {
+  constexpr double kSameTool_m = 1e-6;
+  const auto& first = models.front();
+  const auto other = std::ranges::find_if(models, [&](const ModelAtPoints& one) {
+    return (one.tool_m - first.tool_m).norm() > kSameTool_m;
+  });
+  if (other == models.end()) return {};
+  return fail(ErrorCode::Usage,
+              fmt::format("{} and {} have different tool offsets, the points were measured with "
+                          "one: give it with --tool",
+                          first.model.name, other->model.name));
+}
+
+Result<std::vector<ModelAtPoints>> models_of(const VerifyArguments& arguments) {
+  std::vector<ModelAtPoints> models;
+  for (const std::string& name : arguments.models) {
+    auto model = compared_model(name, arguments.store);
+    ABBE_TRY(model);
+    const auto tool_m = tool_of(arguments.tool, model->document.model);
+    ABBE_TRY(tool_m);
+    models.push_back({std::move(*model), *tool_m});
+  }
+  ABBE_TRY(check_tools(models));
+  return models;
+}
+
 /// The shots at places inside the validity volume that alone do not fit the model.
 std::vector<std::string> off_with_model(const VerificationFile& file,
                                         const verify::Observations& observed,
-                                        const verify::Comparison& compared,
-                                        const calib::VolumetricModel& model,
-                                        const calib::Vector3& tool_m) {
+                                        const ModelAtPoints& one) {
   std::vector<calib::Vector3> measured_m, corrected_m;
   std::vector<std::size_t> shots;
-  for (const std::size_t place : compared.inside)
+  for (const std::size_t place : one.comparison.inside)
     shots.insert(shots.end(), observed.shots[place].begin(), observed.shots[place].end());
   std::ranges::sort(shots);
   for (const std::size_t shot : shots) {
     const auto& [reading_m, at_m] = file.points[shot];
     measured_m.push_back(at_m);
-    corrected_m.emplace_back(reading_m + model.V_at(reading_m, tool_m));
+    corrected_m.emplace_back(reading_m + one.model.document.model.V_at(reading_m, one.tool_m));
   }
   // An error of the size of those of the machine is one that the model does not know.
-  auto off = calib::fit::points_off(measured_m, corrected_m, compared.before.rms_m);
+  auto off = calib::fit::points_off(measured_m, corrected_m, one.comparison.before.rms_m);
   for (auto& found : off.points) found.point = shots[found.point];
   return lines_of_points_off(
       file, off, "check or repeat this point; if it is right, the model is wrong there");
 }
 
+/// One model, also on the grid.
+Result<void> compare_one(Verification& v, const VerificationFile& file,
+                         const verify::Options& options) {
+  ModelAtPoints& one = v.models.front();
+  auto compared = verify::compare(v.observations, one.model.document.model, one.tool_m, options);
+  if (!compared) return tl::make_unexpected(error_of(compared.error()));
+  one.comparison = std::move(*compared);
+  v.inside = one.comparison.inside.size();
+  v.points_off = off_with_model(file, v.observations, one);
+  if (!v.different_machines.empty()) one.model.cautions.push_back(v.different_machines);
+  return {};
+}
+
+/// The places at which all models are valid: the models are compared at the same places.
+verify::Observations inside_all(const verify::Observations& all,
+                                const std::vector<ModelAtPoints>& models) {
+  verify::Observations common;
+  common.frame = all.frame;
+  common.T_machine_tracker = all.T_machine_tracker;
+  common.repeatability_m = all.repeatability_m;
+  for (std::size_t i = 0; i < all.readings_m.size(); ++i) {
+    const bool inside = std::ranges::all_of(models, [&](const ModelAtPoints& one) {
+      return one.model.document.model.validity().contains(all.readings_m[i]);
+    });
+    if (!inside) continue;
+    common.readings_m.push_back(all.readings_m[i]);
+    common.measured_m.push_back(all.measured_m[i]);
+    common.V_m.push_back(all.V_m[i]);
+    common.shots.push_back(all.shots[i]);
+  }
+  return common;
+}
+
+/// Several models at the places where all are valid.
+Result<void> compare_each(Verification& v) {
+  const auto common = inside_all(v.observations, v.models);
+  v.inside = common.shots.size();
+  for (auto& [model, tool_m, comparison] : v.models) {
+    auto compared = verify::compare_at_points(common, model.document.model, tool_m);
+    if (!compared) {
+      const auto error = error_of(compared.error());
+      return fail(error.code, fmt::format("{}: {}", model.name, error.text));
+    }
+    comparison = std::move(*compared);
+  }
+  return {};
+}
+
 }  // namespace
 
-Result<VerifyOutcome> verify_model(const VerifyArguments& arguments,
+Result<Verification> verify_models(const VerifyArguments& arguments,
                                    std::optional<Error>& cut_short, const Progress& progress) {
   ABBE_TRY(check_verify(arguments));
   const auto options = options_of(arguments);
   ABBE_TRY(options);
-  auto model = compared_model(arguments.models.front(), arguments.store);
-  ABBE_TRY(model);
-  const auto tool_m = tool_of(arguments.tool, model->document.model);
-  ABBE_TRY(tool_m);
-
-  Verification v;
-
+  auto models = models_of(arguments);
+  ABBE_TRY(models);
+  Verification v{.models = std::move(*models)};
   if (!arguments.planes.empty()) {
     const auto planes = parse_mm("--planes-mm", arguments.planes);
     ABBE_TRY(planes);
     v.planes_m = *planes;
   }
 
-  std::string different;
-  auto points = points_of(arguments, {{model->name, model->machine}}, different, progress);
+  const bool several = v.models.size() > 1;
+  const auto points = points_for(v, arguments, progress);
   ABBE_TRY(points);
-  cut_short = std::move(points->cut_short);
-
-  VerificationFile& file = points->file;
-  auto observed = observed_in(arguments, file);
+  if (!several) cut_short = points->cut_short;
+  auto observed = observed_in(arguments, points->file);
   ABBE_TRY(observed);
-  auto compared = verify::compare(*observed, model->document.model, *tool_m, *options);
-  if (!compared) return tl::make_unexpected(error_of(compared.error()));
-
-  auto off = off_with_model(file, *observed, *compared, model->document.model, *tool_m);
+  cut_short = points->cut_short;
   v.observations = std::move(*observed);
-  v.comparison = std::move(*compared);
-  if (!file.source.name.empty()) v.inputs = {file.source};
-  v.lines = std::move(file.lines);
-  if (cut_short) v.cut_short = cut_short->text;
-
-  v.cautions = std::move(model->cautions);
-  if (!different.empty()) v.cautions.push_back(std::move(different));
-  return VerifyOutcome{std::move(model->document), std::move(v), std::move(off),
-                       std::move(model->machine)};
+  ABBE_TRY(several ? compare_each(v) : compare_one(v, points->file, *options));
+  return v;
 }
 
 }  // namespace abbe::daemon

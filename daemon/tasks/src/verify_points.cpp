@@ -62,39 +62,7 @@ OfMachine of_points(const VerifyArguments& arguments, const std::string& machine
   return {arguments.live ? "the daemon" : printable_line(arguments.recording), machine};
 }
 
-/// The place of a point in messages: "points.csv:9", or "point 8" if it is not from a file.
-std::string place_of(const VerificationFile& file, std::size_t point) {
-  return point < file.lines.size() ? fmt::format("{}:{}", file.source.name, file.lines[point])
-                                   : fmt::format("point {}", point + 1);
-}
-
-/// `error` of the fit of all points: if some alone do not fit, they are the cause.
-Error with_points_off(Error error, const VerificationFile& file) {
-  std::vector<calib::Vector3> measured_m, readings_m;
-  for (const auto& point : file.points) {
-    measured_m.push_back(point.measured_m);
-    readings_m.push_back(point.reading_m);
-  }
-  const auto off = calib::fit::points_off(measured_m, readings_m);
-  if (off.points.empty()) return error;
-  return {error.code,
-          fmt::format("verification: {} of {} points alone do not fit the others",
-                      off.points.size(), file.points.size()),
-          lines_of_points_off(file, off, "correct or delete it")};
-}
-
-}  // namespace
-
-Result<void> check_verify(const VerifyArguments& arguments) {
-  if (arguments.models.empty()) return fail(ErrorCode::Usage, "verify: give a model");
-  const int given =
-      !arguments.points.empty() + !arguments.recording.empty() + (arguments.live ? 1 : 0);
-  if (given != 1) return fail(ErrorCode::Usage, "verify: give --points, --recording or --live");
-  if (arguments.live && arguments.out.empty())
-    return fail(ErrorCode::Usage, "verify --live: -o is required: the points are saved there");
-  return {};
-}
-
+/// The points for models of `machines`; sets `different` to different_machines().
 Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMachine> machines,
                              std::string& different, const Progress& progress) {
   const auto accept = [&](const std::string& machine) -> Result<void> {
@@ -122,6 +90,41 @@ Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMac
   }
 
   return arguments.live(keep_them, accept);
+}
+
+/// The place of a point in messages: "points.csv:9", or "point 8" if it is not from a file.
+std::string place_of(const VerificationFile& file, std::size_t point) {
+  return point < file.lines.size() ? fmt::format("{}:{}", file.source.name, file.lines[point])
+                                   : fmt::format("point {}", point + 1);
+}
+
+/// `error` of the fit of all points: if some alone do not fit, they are the cause.
+Error with_points_off(Error error, const VerificationFile& file) {
+  std::vector<calib::Vector3> measured_m, readings_m;
+  for (const auto& point : file.points) {
+    measured_m.push_back(point.measured_m);
+    readings_m.push_back(point.reading_m);
+  }
+  const auto off = calib::fit::points_off(measured_m, readings_m);
+  if (off.points.empty()) return error;
+  return {error.code,
+          fmt::format("verification: {} of {} points alone do not fit the others",
+                      off.points.size(), file.points.size()),
+          lines_of_points_off(file, off, "correct or delete it")};
+}
+
+}  // namespace
+
+Result<LivePoints> points_for(Verification& v, const VerifyArguments& arguments,
+                              const Progress& progress) {
+  std::vector<OfMachine> machines;
+  for (const auto& one : v.models) machines.push_back({one.model.name, one.model.machine});
+  auto points = points_of(arguments, std::move(machines), v.different_machines, progress);
+  ABBE_TRY(points);
+  if (!points->file.source.name.empty()) v.inputs = {points->file.source};
+  v.lines = points->file.lines;
+  if (points->cut_short) v.cut_short = points->cut_short->text;
+  return points;
 }
 
 std::vector<std::string> lines_of_points_off(const VerificationFile& file,

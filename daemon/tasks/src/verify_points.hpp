@@ -1,5 +1,5 @@
 #pragma once
-/// The points of a verification: checked, read, kept, and in the frame of the machine.
+/// The points of a verification: read, kept, and in the frame of the machine.
 
 #include <string>
 #include <string_view>
@@ -11,15 +11,10 @@
 
 namespace abbe::daemon {
 
-/// Usage unless there is a model and one kind of points, and for points of the running machine also
-/// a folder to keep them.
-[[nodiscard]] Result<void> check_verify(const VerifyArguments& arguments);
-
-/// The points for models of `machines`. They must be of the same machine, as far as it is known: a
-/// file of points does not state it. `different`: different_machines().
-[[nodiscard]] Result<LivePoints> points_of(const VerifyArguments& arguments,
-                                           std::vector<OfMachine> machines, std::string& different,
-                                           const Progress& progress);
+/// The points for the models of `v`. They must be of the same machine, as far as it is known: a
+/// file of points does not state it. Sets in `v` what it states of points and machines.
+[[nodiscard]] Result<LivePoints> points_for(Verification& v, const VerifyArguments& arguments,
+                                            const Progress& progress);
 /// The points in the frame that the arguments name; an error names points that alone do not fit.
 [[nodiscard]] Result<calib::verify::Observations> observed_in(const VerifyArguments& arguments,
                                                               const VerificationFile& file);

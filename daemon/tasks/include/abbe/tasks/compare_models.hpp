@@ -3,11 +3,10 @@
 
 #include <cstddef>
 #include <string>
-#include <vector>
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
-#include "abbe/tasks/model_source.hpp"
+#include "abbe/tasks/same_machine.hpp"
 
 namespace abbe::daemon {
 
@@ -19,14 +18,13 @@ struct CompareModelsArguments {
 };
 
 struct ModelsComparison {
+  ComparedModel a, b;
   std::size_t points = 0;
   calib::ModelDifference difference;
-  std::vector<std::string> cautions_a, cautions_b;
-  std::string machine_a, machine_b;
   std::string different_machines;  ///< empty: they are the same
 };
 
-/// Usage: models of different machines that `other_machine` does not allow. DataInsufficient: the
+/// Usage: no second model; models of different machines that `other_machine` does not allow. DataInsufficient: the
 /// models have no common volume.
 [[nodiscard]] Result<ModelsComparison> compare_models(const CompareModelsArguments&);
 

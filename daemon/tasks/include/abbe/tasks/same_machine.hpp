@@ -4,6 +4,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "abbe/tasks/model_source.hpp"
 
@@ -24,5 +25,17 @@ struct OfMachine {
 [[nodiscard]] Result<std::string> require_same_machine(const std::string& command,
                                                        std::span<const OfMachine> compared,
                                                        bool other_machine);
+
+/// A model that is compared with measurements or with other models.
+struct ComparedModel {
+  std::string name;  ///< as a person gives it
+  ModelDocument document;
+  std::vector<std::string> cautions;  ///< cautions_of()
+  std::string machine;                ///< of_machine()
+};
+
+/// Errors of found_model().
+[[nodiscard]] Result<ComparedModel> compared_model(const std::string& name,
+                                                   const StoreOption& where);
 
 }  // namespace abbe::daemon

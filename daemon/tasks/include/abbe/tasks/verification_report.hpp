@@ -3,28 +3,45 @@
 /// residual errors, their ratio to the errors without compensation (R_resmag of [Li OMM] section
 /// 5.4), and the vectors in three planes. Pure.
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/verify/compare.hpp"
-#include "abbe/model/model_document.hpp"
+#include "abbe/tasks/same_machine.hpp"
 
 namespace abbe::daemon {
 
+/// A model at the places that are compared.
+struct ModelAtPoints {
+  ComparedModel model;
+  calib::Vector3 tool_m = calib::Vector3::Zero();
+  calib::verify::Comparison comparison{};
+};
+
+/// One model, compared also on a grid; or several at the same places, those that are inside the
+/// validity volume of every one.
 struct Verification {
-  calib::verify::Observations observations;
-  calib::verify::Comparison comparison;
+  std::vector<ModelAtPoints> models;         ///< in the order of the arguments; at least one
+  calib::verify::Observations observations;  ///< of all places
+  std::size_t inside = 0;                    ///< places that are compared
   std::vector<InputFile> inputs;
   std::vector<std::size_t> lines;  ///< line numbers of the shots in their file; may be empty
+  /// Points that alone do not fit the model, one line each; empty for several models.
+  std::vector<std::string> points_off;
   /// why some points are missing or may be wrong; empty: all are complete
-  std::string cut_short{};
-  /// What stands against the model, such as the verdict of a refused one.
-  std::vector<std::string> cautions{};
+  std::string cut_short;
+  std::string different_machines;  ///< different_machines(); of one model also one of its cautions
   /// Positions of the planes in which the vectors are drawn, one coordinate per axis; default: the
   /// middle of the grid.
   std::optional<calib::Vector3> planes_m;
+
+  /// Of the first model.
+  [[nodiscard]] const calib::verify::Comparison& comparison() const {
+    return models.front().comparison;
+  }
 };
 
 /// The verdict in one sentence, for example "better with the model: 0.090 um rms left, 41.300 um
@@ -39,8 +56,9 @@ struct Verification {
 /// does.
 [[nodiscard]] std::optional<std::string> why_no_ratio(const calib::verify::Comparison&);
 
-/// The text of report.html, a page that needs no other file and begins with the verdict.
-[[nodiscard]] std::string verification_report(const ModelDocument&, const Verification&);
+/// The text of report.html of the first model, a page that needs no other file and begins with the
+/// verdict.
+[[nodiscard]] std::string verification_report(const Verification&);
 
 /// grid.csv, one row per grid point: position, measured error (las), error of the model (model),
 /// error of the model after its best-fit rigid motion (turned), and R_resmag of model and turned:

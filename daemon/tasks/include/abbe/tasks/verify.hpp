@@ -8,7 +8,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/tables/input_files.hpp"
-#include "abbe/tasks/compared_model.hpp"
+#include "abbe/tasks/model_source.hpp"
 #include "abbe/tasks/progress.hpp"
 #include "abbe/tasks/verification_report.hpp"
 
@@ -41,40 +41,13 @@ struct VerifyArguments {
   bool other_machine = false;
 };
 
-struct VerifyOutcome {
-  ModelDocument document;
-  Verification verification;
-  std::vector<std::string> points_off{};  ///< points that alone do not fit, one line each
-  std::string machine;                    ///< of_machine() of the model
-};
-
-/// The first of `arguments.models` against the points. Sets `cut_short` if points are missing, even
-/// if the comparison fails: the missing points may be the cause of its failure.
-[[nodiscard]] Result<VerifyOutcome> verify_model(const VerifyArguments& arguments,
-                                                 std::optional<Error>& cut_short,
-                                                 const Progress& progress);
-
-/// A model at the places that are compared.
-struct ModelAtPoints {
-  ComparedModel model;
-  calib::Vector3 tool_m = calib::Vector3::Zero();
-  calib::verify::Comparison comparison{};  ///< compare_at_points()
-};
-
-/// All models at the same places: those that are inside the validity volume of every one.
-struct SeveralOutcome {
-  std::vector<ModelAtPoints> models;         ///< in the order of the arguments
-  calib::verify::Observations observations;  ///< of all places
-  std::size_t inside_all = 0;                ///< places that are compared
-  std::string different_machines;            ///< different_machines()
-};
-
-/// All `arguments.models` against the points, for example of runs at several feeds. Usage: an
+/// One model, or several at the same points, for example of runs at several feeds. Usage: an
 /// argument that is for one model; different tool offsets of the models without `arguments.tool`.
 /// DataInsufficient: fewer than 4 places inside the validity volume of all models. Sets `cut_short`
-/// if points are missing.
-[[nodiscard]] Result<SeveralOutcome> verify_several(const VerifyArguments& arguments,
-                                                    std::optional<Error>& cut_short,
-                                                    const Progress& progress);
+/// if points are missing, even if the comparison fails: the missing points may be the cause of its
+/// failure. With several models it is not set if the points alone contradict each other.
+[[nodiscard]] Result<Verification> verify_models(const VerifyArguments& arguments,
+                                                 std::optional<Error>& cut_short,
+                                                 const Progress& progress);
 
 }  // namespace abbe::daemon

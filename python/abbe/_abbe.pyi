@@ -139,10 +139,13 @@ def identify_joint(*, machine: str, parts: str, estimator: str | None = None,
                    compare_with: str | None = None) -> Model:
     """`abbe identify joint`; abbe.Error "data_insufficient" for parts that contradict each other."""
 def save_model(model: Model, file: str) -> None: ...
-def verify(model: str, *, points: str | None = None, recording: str | None = None,
+def verify(model: str | Sequence[str], *, points: str | None = None, recording: str | None = None,
            store: str | None = None, tool_mm: str | None = None) -> dict[str, Any]:
     """`abbe verify`: effect ("better", "not seen", "worse"), places, inside, before and after (mean_m,
-    rms_m, max_m), cautions, points_off, cut_short (why points are missing; empty: none are)."""
+    rms_m, max_m), cautions, points_off, cut_short (why points are missing; empty: none are).
+
+    Of a list of models: places, inside (where all models are valid), points_off, cut_short, and models, one
+    per model: name, model, machine, effect, before, after, cautions."""
 def plan_otf(*, machine: str, trackers_at_mm: Sequence[str] = (), length_m: float | None = None,
              duration_min: float | None = None, feed_mm_per_min: float = ...) -> dict[str, Any]:
     """`abbe plan otf`: vertices_m (N, 3), tracker_m, prediction (rms_u_m, max_u_m, length_m, duration_s)."""

@@ -77,21 +77,41 @@ py::dict lengths_of(const calib::VectorStatistics& s) {
   return out;
 }
 
-py::dict verify(const daemon::VerifyArguments& arguments) {
+void add_effect(py::dict& out, const daemon::ModelAtPoints& one) {
+  out["effect"] = daemon::effect_name(calib::verify::effect_at_points(one.comparison));
+  out["before"] = lengths_of(one.comparison.before);
+  out["after"] = lengths_of(one.comparison.after);
+  out["cautions"] = one.model.cautions;
+}
+
+py::list effects_of(const std::vector<daemon::ModelAtPoints>& models) {
+  py::list out;
+  for (const auto& one : models) {
+    py::dict entry;
+    entry["name"] = one.model.name;
+    entry["model"] = model_id(one.model.document);
+    entry["machine"] = one.model.machine;
+    add_effect(entry, one);
+    out.append(std::move(entry));
+  }
+  return out;
+}
+
+/// `as_list`: one entry per model.
+py::dict verify(const daemon::VerifyArguments& arguments, bool as_list) {
   std::optional<daemon::Error> cut_short;
   const auto v = without_lock([&] {
     auto verified = verify_models(arguments, cut_short, daemon::Progress{});
     if (!verified && cut_short) verified.error().details.push_back(cut_short->text);
     return verified;
   });
-  const auto& one = v.models.front();
   py::dict out;
-  out["effect"] = daemon::effect_name(calib::verify::effect_at_points(one.comparison));
   out["places"] = v.observations.shots.size();
   out["inside"] = v.inside;
-  out["before"] = lengths_of(one.comparison.before);
-  out["after"] = lengths_of(one.comparison.after);
-  out["cautions"] = one.model.cautions;
+  if (as_list)
+    out["models"] = effects_of(v.models);
+  else
+    add_effect(out, v.models.front());
   out["points_off"] = v.points_off;
   out["cut_short"] = v.cut_short;
   return out;
@@ -140,6 +160,7 @@ std::string text_or_empty(const std::optional<std::string>& text) {
 }
 
 using Text = std::optional<std::string>;
+using OneOrSeveral = std::variant<std::string, std::vector<std::string>>;
 
 void bind_identify_otf(py::module_& module) {
   module.def(
@@ -254,17 +275,18 @@ void bind_identify(py::module_& module) {
   module.def("save_model", &save, py::arg("model"), py::arg("file"));
   module.def(
       "verify",
-      [](const std::string& model, const Text& points, const Text& recording, const Text& store,
+      [](const OneOrSeveral& model, const Text& points, const Text& recording, const Text& store,
          const Text& tool_mm) {
         daemon::VerifyArguments arguments;
-        arguments.models = {model};
+        const auto* const one = std::get_if<std::string>(&model);
+        arguments.models = one ? std::vector{*one} : std::get<std::vector<std::string>>(model);
         arguments.points = text_or_empty(points);
         arguments.recording = text_or_empty(recording);
         if (store) arguments.store.folder = *store;
         arguments.tool = text_or_empty(tool_mm);
         if (arguments.points.empty() == arguments.recording.empty())
           throw Raised({daemon::ErrorCode::Usage, "verify: give points or recording", {}});
-        return verify(arguments);
+        return verify(arguments, one == nullptr);
       },
       py::arg("model"), py::kw_only(), py::arg("points") = py::none(),
       py::arg("recording") = py::none(), py::arg("store") = py::none(),

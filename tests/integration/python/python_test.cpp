@@ -182,6 +182,7 @@ fault(lambda: abbe.identify_evemu(machine="m.toml", touches="t.csv", calibrator=
                                   artefact_C=21))
 fault(lambda: abbe.identify_mfb(machine="m.toml", points="p.csv", bar="b.toml"))
 fault(lambda: abbe.verify(sys.argv[1]))
+fault(lambda: abbe.verify([], points="points.csv"))
 )";
   const auto seen = python({"-c", kFaults, ABBE_MODEL});
   EXPECT_EQ(seen.code, 0) << seen.err;
@@ -195,8 +196,9 @@ fault(lambda: abbe.verify(sys.argv[1]))
             HasSubstr("usage: --mode: \"stand-still\": must be on-the-fly, standstill"),
             HasSubstr("usage: --artefact-C and --u-artefact-K: give both"),
             HasSubstr("usage: identify mfb needs --plan"),
-            HasSubstr("usage: verify: give points or recording")));
-  EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 12);
+            HasSubstr("usage: verify: give points or recording"),
+            HasSubstr("usage: verify: give a model")));
+  EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 13);
 }
 
 /// Counts and times of all samples, exact.
@@ -252,6 +254,8 @@ rows_mm = 1e3 * numpy.hstack([places_m, places_m + V_m])
 numpy.savetxt(grid + ".points", rows_mm, fmt="%.9f", delimiter=",", comments="",
               header="x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm")
 print("effect", abbe.verify(copy, points=grid + ".points")["effect"])
+several = abbe.verify([copy, copy], points=grid + ".points")
+print("several", several["inside"], [one["effect"] for one in several["models"]])
 
 plan = abbe.plan_otf(machine=machine, trackers_at_mm=["-750,-620,-350"], length_m=6)
 print("planned", len(plan["vertices_m"]), "vertices", plan["prediction"]["rms_u_m"] > 0)
@@ -308,11 +312,13 @@ except abbe.Error as error:
   const auto used = python({"-c", kUseCases, recording, file("abbed.toml"), file("data/models"),
                             file("grid.csv"), file("copy.json")});
   EXPECT_EQ(used.code, 0) << used.err;
-  EXPECT_THAT(used.out,
-              AllOf(HasSubstr("identified " + json::parse(identified.out)["id"].get<std::string>()),
-                    HasSubstr("verdict accepted"), HasSubstr("saved True"),
-                    HasSubstr("effect better"), ContainsRegex("planned [1-9][0-9]* vertices"),
-                    HasSubstr("exported 1 file of " + active), HasSubstr("missing bad_input")));
+  EXPECT_THAT(
+      used.out,
+      AllOf(HasSubstr("identified " + json::parse(identified.out)["id"].get<std::string>()),
+            HasSubstr("verdict accepted"), HasSubstr("saved True"), HasSubstr("effect better"),
+            ContainsRegex("several [1-9][0-9]* \\['better', 'better'\\]"),
+            ContainsRegex("planned [1-9][0-9]* vertices"),
+            HasSubstr("exported 1 file of " + active), HasSubstr("missing bad_input")));
 }
 
 TEST_F(Python, VerifiesAtAStandstillAndOrdersTheTracker) {

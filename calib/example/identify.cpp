@@ -75,7 +75,7 @@ int main() {
 
   const auto points = drive(machine, path, tracker_m, noise);
   otf::Options options;
-  options.block_samples = 20;  // 8 mm of travel
+  options.segment_samples = 20;  // 8 mm of travel
   const auto found = otf::identify(points, machine, path, noise, options);
   if (!found) {
     std::cerr << "identify: " << found.error().text << '\n';

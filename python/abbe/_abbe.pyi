@@ -119,7 +119,7 @@ def identify_otf(*, machine: str | None = None, path: str | None = None, tracker
                  encoder: str | None = None, recording: str | None = None, targets: Sequence[str] = (),
                  tracker_centres_mm: Sequence[str] = (),
                  mode: str | None = None, estimator: str | None = None, tables: str | None = None,
-                 backlash: str | None = None, smoothness: str | None = None,
+                 backlash: str | None = None, smoothness_um: str | None = None,
                  u_scale_ppm: float | None = None, scales_corrected: bool = False,
                  accept_path_orientation: bool = False, compare_with: str | None = None) -> Model:
     """`abbe identify otf`; targets: "X,Y,Z=FILE" in mm, one per run."""

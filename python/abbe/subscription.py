@@ -50,7 +50,7 @@ class Subscription:
         command = [program, "--json"]
         command += ["--config", config] if config is not None else ["--domain", str(domain)]
         for name, value in (("--machine", machine), ("--machine-id", machine_id), ("--profile", profile), ("--security", keys),
-                            ("--timeout", timeout_s)):
+                            ("--timeout-s", timeout_s)):
             if value is not None:
                 command += [name, str(value)]
         try:

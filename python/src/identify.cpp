@@ -195,7 +195,7 @@ void bind_identify_otf(py::module_& module) {
       py::arg("recording") = py::none(), py::arg("targets") = std::vector<std::string>{},
       py::arg("tracker_centres_mm") = std::vector<std::string>{}, py::arg("mode") = py::none(),
       py::arg("estimator") = py::none(), py::arg("tables") = py::none(),
-      py::arg("backlash") = py::none(), py::arg("smoothness") = py::none(),
+      py::arg("backlash") = py::none(), py::arg("smoothness_um") = py::none(),
       py::arg("u_scale_ppm") = py::none(), py::arg("scales_corrected") = false,
       py::arg("accept_path_orientation") = false, py::arg("compare_with") = py::none());
 }
@@ -216,7 +216,7 @@ void bind_identify_touches(py::module_& module) {
         arguments.input.recording = text_or_empty(recording);
         arguments.input.order = order;
         arguments.folds = folds;
-        arguments.input.reference = text_or_empty(rotation_reference);
+        arguments.input.rotation_reference = text_or_empty(rotation_reference);
         arguments.input.u_reference_um = u_reference_um;
         arguments.input.artefact_C = artefact_C;
         arguments.input.u_artefact_K = u_artefact_K;

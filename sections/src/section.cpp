@@ -258,15 +258,18 @@ bool Section::take_integer(std::string_view key, std::int64_t& out, std::int64_t
 }
 
 bool Section::take_word(std::string_view key, std::size_t& out,
-                        const std::vector<std::string_view>& words, Need need) {
+                        const std::vector<std::string_view>& words, std::size_t current,
+                        Need need) {
   const toml::node* node = find(key, need);
   if (node == nullptr) return false;
   const auto value = node->value_exact<std::string>();
   const auto found = value ? std::find(words.begin(), words.end(), *value) : words.end();
   if (found == words.end()) {
+    const std::vector<std::string_view> named(words.begin(),
+                                              words.begin() + static_cast<std::ptrdiff_t>(current));
     fault_at(node->source().begin, key,
-             fmt::format("must be one of \"{}\"{}", fmt::join(words, "\", \""),
-                         value ? protocol::suggestion(*value, words) : ""));
+             fmt::format("must be one of \"{}\"{}", fmt::join(named, "\", \""),
+                         value ? protocol::suggestion(*value, named) : ""));
     return false;
   }
   out = static_cast<std::size_t>(found - words.begin());

@@ -58,7 +58,7 @@ void add_probing(CLI::App& app, BarOptions& o) {
                "no noise, and every stated value is true; the files state the same uncertainties");
   app.add_option("--miss", o.missed, "touches left out: \"X1,hole,3,,2\" as in points.csv")
       ->type_name("TOUCH ...");
-  app.add_option("--outlier", o.outliers, "touches wrong by UM: \"X1,hole,3,,2=50\"")
+  app.add_option("--outlier-um", o.outliers, "touches wrong by UM: \"X1,hole,3,,2=50\"")
       ->type_name("TOUCH=UM ...");
   app.add_option("--turned", o.turned, "the bar lies turned in a measurement or position: \"X2=z\"")
       ->type_name("NAME=AXIS ...");
@@ -66,13 +66,13 @@ void add_probing(CLI::App& app, BarOptions& o) {
 
 Result<void> add_outliers(const BarOptions& o, mfb::ProbingOptions& probing) {
   for (const std::string& text : o.outliers) {
-    const auto outlier = split_at_equals(text, "--outlier");
+    const auto outlier = split_at_equals(text, "--outlier-um");
     ABBE_TRY(outlier);
     double um = 0.0;
     const char* end = outlier->value.data() + outlier->value.size();
     if (std::from_chars(outlier->value.data(), end, um).ptr != end || outlier->value.empty())
       return usage_error(
-          fmt::format("--outlier \"{}\": \"{}\" is not a number of um", text, outlier->value));
+          fmt::format("--outlier-um \"{}\": \"{}\" is not a number of um", text, outlier->value));
     probing.wrong_m[outlier->name] = um * kFromMicro;
   }
   return {};

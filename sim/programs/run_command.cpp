@@ -142,10 +142,10 @@ Subcommand add_run(CLI::App& app) {
   add_machine_options(*sub, choices);
   sub->add_option("--path", choices.path_file, "CSV x_mm,y_mm,z_mm[,feed_mm_per_min]")
       ->type_name("FILE");
-  sub->add_option("--feed", choices.feed_mm_per_min, "mm/min (default 2500)")
+  sub->add_option("--feed-mm-per-min", choices.feed_mm_per_min, "default 2500")
       ->check(CLI::PositiveNumber);
-  sub->add_option("--dwell", choices.dwell_s,
-                  "s of standstill at every vertex (default 0.05; standstill mode needs 0.3)")
+  sub->add_option("--dwell-s", choices.dwell_s,
+                  "standstill at every vertex (default 0.05; standstill mode needs 0.3)")
       ->check(CLI::NonNegativeNumber);
   sub->add_option("--speed", choices.speed,
                   "simulated seconds per second; the daemon must be given the same")

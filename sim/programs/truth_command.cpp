@@ -111,7 +111,7 @@ Subcommand add_truth(CLI::App& app) {
       ->expected(3)
       ->check(CLI::Range(1, 1000))
       ->excludes(points);
-  sub->add_option("--tool", options->tool_mm,
+  sub->add_option("--tool-mm", options->tool_mm,
                   "x,y,z: tool offset in mm (default: [target] offset_mm of the machine)")
       ->delimiter(',')
       ->expected(3);

@@ -52,7 +52,7 @@ supervise = "off"
 )";
 
 /// True if the answer has a determined table: a number as uncertainty of every node, not all of
-/// them 0, as those of nodes that the gauge sets to 0 are.
+/// them 0, as those of nodes that the datum sets to 0 are.
 inline bool has_tables(const nlohmann::json& status) {
   const nlohmann::json& session = status["session"];
   if (session["state"] != "acquiring" || !session.contains("live")) return false;

@@ -23,8 +23,8 @@
 #include <vector>
 
 #include "abbe/calib/internal/geometry/rigid_body_model.hpp"
-#include "abbe/calib/model/gauge.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "config_tables.hpp"
@@ -72,7 +72,7 @@ void write_machine(const fs::path& toml) {
                          "[gate]\naccept = [\"path-orientation\"]\n";
 }
 
-/// The true tables as a parameter vector in gauge G1.
+/// The true tables as a parameter vector in datum G1.
 Eigen::VectorXd true_parameters(const calib::ParameterLayout& layout,
                                 const calib::Vector3& tool_m) {
   std::map<std::string, std::vector<double>> tables;
@@ -98,7 +98,7 @@ Eigen::VectorXd true_parameters(const calib::ParameterLayout& layout,
   U[squareness + 1] = tables.at("B0Z")[0];
   U[squareness + 2] = tables.at("C0Y")[0];
 
-  return calib::to_gauge(calib::Gauge::G1, layout, std::array{tool_m}, U).value();
+  return calib::to_datum(calib::ModelDatum::G1, layout, std::array{tool_m}, U).value();
 }
 
 /// Mean absolute difference between the model and the true tables in G1; infinite without a model.

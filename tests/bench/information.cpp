@@ -27,7 +27,7 @@
 #include "abbe/calib/geometry/table_basis.hpp"
 #include "abbe/calib/internal/estimation/sparse_information.hpp"
 #include "abbe/calib/internal/geometry/rigid_body_model.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 
 namespace {
 
@@ -219,7 +219,7 @@ int main(int argc, char** argv) {
   const int runs = argc > 1 && std::strcmp(argv[1], "--short") == 0 ? 3 : 11;
   const Run run = random_run();
   const std::size_t unknowns = run.layout.fit_size();
-  const estimation::Datum datum(gauge_conditions(Gauge::G1, run.layout));
+  const estimation::Datum datum(datum_conditions(ModelDatum::G1, run.layout));
 
   Information data(unknowns);
   Squared squared;

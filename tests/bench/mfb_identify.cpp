@@ -39,7 +39,7 @@ struct Sums {
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       const Parameter& p = parameters[i];
       if (!(p.u > 0.0)) {
-        continue;  // the gauge fixes it
+        continue;  // the datum fixes it
       }
       constexpr double k95 = 1.96;
       const double off = p.value - truth(static_cast<Eigen::Index>(i));

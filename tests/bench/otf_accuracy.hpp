@@ -57,7 +57,7 @@ inline std::vector<Vector3> points_of_the_bound(const calib::MachineNodes& nodes
 /// Sums over machines of the squares of errors and of their stated uncertainties.
 struct Sums {
   double error_m2 = 0.0, bound_m2 = 0.0;  ///< after the best-fit rigid motion
-  double normalised = 0.0;                ///< (component of V / u)^2, gauge G1
+  double normalised = 0.0;                ///< (component of V / u)^2, datum G1
   std::size_t machines = 0, components = 0;
 
   void add(const OtfRun& run, const calib::VolumetricModel& model) {
@@ -65,7 +65,7 @@ struct Sums {
   }
   void add(const OtfRun& run, const calib::VolumetricModel& model,
            const std::vector<Vector3>& positions) {
-    constexpr double kFixed_m = 1e-9;  // a component below it is fixed by the gauge
+    constexpr double kFixed_m = 1e-9;  // a component below it is fixed by the datum
     std::vector<Vector3> points, left;
     for (const Vector3& q : positions) {
       const calib::VolumetricError e = model.error_at(q, run.machine.target_offset_m);

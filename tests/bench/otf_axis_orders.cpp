@@ -12,7 +12,7 @@
 #include <cstdlib>
 
 #include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "otf_accuracy.hpp"
 
 namespace {
@@ -25,23 +25,23 @@ constexpr std::array kChains{"[w X' b Y Z (C1) t]",  "[w Y' b X Z (C1) t]", "[w 
                              "[w X' Z' b Y (C1) t]", "[w Y' Z' X' b t]",    "[w Z' b Y X (C1) t]"};
 
 Sums simulate(const char* chain, std::uint64_t first_seed, std::uint64_t machines) {
-  Sums joint;
+  Sums simultaneous;
   for (std::uint64_t seed = first_seed; seed < first_seed + machines; ++seed) {
     OtfRun run = otf_accuracy::noise_only(seed, 0.0, chain);
     const auto samples = never_worse::measure(run);
     Options options;
-    options.block_samples = suitable_block_samples(samples);
-    options.estimator = Estimator::Joint;
+    options.segment_samples = suitable_segment_samples(samples);
+    options.estimator = Estimator::Simultaneous;
     const auto found = identify(samples, run.machine, {run.path_m}, run.noise, options);
     if (!found) {
       std::printf("  %s seed %llu: %s\n", chain, static_cast<unsigned long long>(seed),
                   found.error().text.c_str());
       continue;
     }
-    joint.add(run, found->solution.model);
+    simultaneous.add(run, found->solution.model);
   }
-  joint.print(chain);
-  return joint;
+  simultaneous.print(chain);
+  return simultaneous;
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include <ctime>
 
 #include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "otf_accuracy.hpp"
 
 namespace {
@@ -73,8 +73,8 @@ int main(int argc, char** argv) {
                                                     .shape = abbe::sim::Shape::Cubic});
     const auto samples = never_worse::measure(run);
     Options options;
-    options.block_samples = suitable_block_samples(samples);
-    options.estimator = Estimator::Joint;
+    options.segment_samples = suitable_segment_samples(samples);
+    options.estimator = Estimator::Simultaneous;
     for (std::size_t i = 0; i < kForms.size(); ++i) {
       use(run, kForms[i]);
       const std::clock_t start = std::clock();

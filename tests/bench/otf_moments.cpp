@@ -1,8 +1,8 @@
 /// Requirement: the information of every tracker sample is accumulated in at most 80 ns per sample
 /// (488,664 samples in 0.04 s) and 5 MB. The samples follow the path of reference case A at 500 Hz
-/// and 2500 mm/min with the noise of a tracker. Peers in the same run: the rows of the block means
-/// of the same samples, which the identification uses, and Eigen's dense QR of those rows. Build
-/// type Release.
+/// and 2500 mm/min with the noise of a tracker. Peers in the same run: the rows of the segment
+/// means of the same samples, which the identification uses, and Eigen's dense QR of those rows.
+/// Build type Release.
 ///     bench_otf_moments [--short]
 
 #include <fmt/format.h>
@@ -58,8 +58,8 @@ void accumulate(MomentAccumulator& moments, const Path& path,
 }
 
 /// Two rows per 100 samples.
-Observations block_rows(const calib::TableBasis& basis, const Path& path, const Vector3& target_m,
-                        const std::vector<std::vector<Vector3>>& legs) {
+Observations segment_rows(const calib::TableBasis& basis, const Path& path, const Vector3& target_m,
+                          const std::vector<std::vector<Vector3>>& legs) {
   Observations o{.basis = basis, .target_offset_m = target_m};
   for (std::size_t leg = 0; leg < legs.size(); ++leg) {
     std::vector<TrackerObservation> means;
@@ -117,8 +117,8 @@ int main(int argc, char** argv) {
   const MomentAccumulator copy = moments;
   const double megabytes = static_cast<double>(mallinfo2().uordblks - used_bytes) / 1e6;
 
-  const Observations o = block_rows(basis, path, machine.target_offset_m, legs);
-  const double blocks_s = median_s(runs, [&] { (void)information_of(o); });
+  const Observations o = segment_rows(basis, path, machine.target_offset_m, legs);
+  const double segments_s = median_s(runs, [&] { (void)information_of(o); });
   const Eigen::MatrixXd dense = dense_of(o);
   const double dense_s =
       median_s(1, [&] { (void)Eigen::MatrixXd(dense.householderQr().matrixQR()); });
@@ -128,8 +128,8 @@ int main(int argc, char** argv) {
   fmt::print("  accumulation         {:7.1f} ms, {:.0f} ns per sample (asked {:.0f})\n",
              1e3 * accumulate_s, each_ns, kAsked_ns);
   fmt::print(
-      "  R of all samples     {:7.1f} ms, {:.2f} x R of {} rows of block means ({:.1f} ms)\n",
-      1e3 * information_s, information_s / blocks_s, o.rows.size(), 1e3 * blocks_s);
+      "  R of all samples     {:7.1f} ms, {:.2f} x R of {} rows of segment means ({:.1f} ms)\n",
+      1e3 * information_s, information_s / segments_s, o.rows.size(), 1e3 * segments_s);
   fmt::print("  dense QR of the rows {:7.1f} ms, {:.1f} x R of all samples\n", 1e3 * dense_s,
              dense_s / information_s);
   fmt::print("  memory {:.2f} MB (asked {:.0f})\n", megabytes, kAskedMegabytes);

@@ -162,7 +162,7 @@ Sums simulate(std::size_t number, std::uint64_t first_seed, std::uint64_t machin
     run.dwell_s = 0.5;
     const auto driven = never_worse::measure(run);
     Options options;
-    options.block_samples = suitable_block_samples(driven);
+    options.segment_samples = suitable_segment_samples(driven);
     const Path path{run.path_m};
     const RigidTransform& T = run.T_machine_tracker;
     const NestRunOptions wanted = cases(static_cast<unsigned>(seed))[number].run;

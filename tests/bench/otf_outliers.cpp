@@ -73,7 +73,7 @@ const std::vector<StreamFault>& faults() {
   return all;
 }
 
-/// Mean error of a model of case A on the grid of the nodes, gauge G1.
+/// Mean error of a model of case A on the grid of the nodes, datum G1.
 double mean_error_m(const VolumetricModel& model) {
   const Machine machine = case_a_machine();
   const auto layout = *ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
@@ -90,8 +90,8 @@ double mean_error_m(const VolumetricModel& model) {
 Result<Identification> of_all_samples(const Stream& samples, const Machine& machine,
                                       const Path& path, const Noise& noise,
                                       const Options& options) {
-  return make_blocks(samples, options).and_then([&](const BlockSeries& series) {
-    return identify_blocks(series, machine, path, noise, options);
+  return make_segments(samples, options).and_then([&](const SegmentSeries& series) {
+    return identify_segments(series, machine, path, noise, options);
   });
 }
 
@@ -99,7 +99,7 @@ Result<Identification> of_all_samples(const Stream& samples, const Machine& mach
 void case_a_with(const StreamFault& fault, const Stream& stream, double& clean_m) {
   constexpr int kDraws = 5;
   Options options;
-  options.estimator = Estimator::Joint;
+  options.estimator = Estimator::Simultaneous;
   double error_m = 0.0, of_all_m = 0.0, aside = 0.0;
   const std::clock_t start = std::clock();
   for (int draw = 1; draw <= kDraws; ++draw) {
@@ -155,8 +155,8 @@ void simulate(const StreamFault& fault, std::uint64_t first_seed, std::uint64_t 
     Stream samples = never_worse::measure(run);
     fault.put_in(samples, run.random);
     Options options;
-    options.estimator = Estimator::Joint;
-    options.block_samples = suitable_block_samples(samples);
+    options.estimator = Estimator::Simultaneous;
+    options.segment_samples = suitable_segment_samples(samples);
     const Path path{run.path_m};
     const auto found = identify(samples, run.machine, path, run.noise, options);
     if (!found) {

@@ -15,7 +15,7 @@
 #include <ctime>
 
 #include "abbe/calib/otf/identify/targets.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "otf_accuracy.hpp"
 
 namespace {
@@ -100,8 +100,8 @@ int main(int argc, char** argv) {
       }
 
       Options options;
-      options.block_samples = suitable_block_samples(samples[0]);
-      options.estimator = Estimator::Joint;
+      options.segment_samples = suitable_segment_samples(samples[0]);
+      options.estimator = Estimator::Simultaneous;
       const std::clock_t start = std::clock();
       const auto found = identify_targets(runs, run.machine, run.noise, options);
       seconds += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;

@@ -13,7 +13,7 @@
 
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -62,9 +62,9 @@ void take_as_long(OtfRun& run, double seconds) {
   }
 }
 
-/// V of the model minus V of the truth on a grid over the travel, as stated (gauge G1).
+/// V of the model minus V of the truth on a grid over the travel, as stated (datum G1).
 void compare(Figures& figures, const OtfRun& run, const calib::VolumetricModel& model) {
-  constexpr double kFixed_m = 1e-9;  // a smaller component is fixed by the gauge
+  constexpr double kFixed_m = 1e-9;  // a smaller component is fixed by the datum
   for (const Vector3& q : calib::tensor_grid(run.machine.nodes)) {
     const calib::VolumetricError e = model.error_at(q, run.machine.target_offset_m);
     const Vector3 left_m = e.V_m - sim::error_m(run.truth, q);
@@ -86,7 +86,7 @@ bool identify_and_compare(Figures& figures, OtfRun run) {
   calib::otf::Options options;
   options.mode = run.mode;
   options.standstill.u_repeatability_m = 0.0;
-  options.block_samples = calib::otf::suitable_block_samples(samples);
+  options.segment_samples = calib::otf::suitable_segment_samples(samples);
   const auto found = calib::otf::identify(samples, run.machine, {run.path_m}, run.noise, options);
   if (!found) {
     fmt::print("failed: {}\n", found.error().text);

@@ -25,9 +25,9 @@ Vector3 vector_from(const std::vector<double>& v, std::size_t from) {
 
 VolumetricModel table_model(const ParameterLayout& layout, const Eigen::VectorXd& U,
                             const Eigen::MatrixXd& covariance, Interpolation interpolation) {
-  return *VolumetricModel::from_vector(layout, Gauge::G1, std::array{kCubicTool}, U, covariance,
-                                       *ValidityVolume::hull_of(tensor_grid(layout.nodes())),
-                                       interpolation);
+  return *VolumetricModel::from_vector(
+      layout, ModelDatum::G1, std::array{kCubicTool}, U, covariance,
+      *ValidityVolume::hull_of(tensor_grid(layout.nodes())), interpolation);
 }
 
 Eigen::MatrixXd random_covariance(const ParameterLayout& layout, double u_m, unsigned seed) {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "abbe/calib/internal/estimation/null_space.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -166,7 +166,7 @@ TEST(Datum, CountsWeakCombinationsAsZeroBelowAStatedThreshold) {
     EXPECT_THAT(text, testing::HasSubstr("unknown 1"));
     EXPECT_THAT(text, testing::HasSubstr("unknown 2"));
     EXPECT_THAT(text, testing::Not(testing::AnyOf(testing::HasSubstr("unknown 0"),
-                                                  testing::HasSubstr("gauge"))));
+                                                  testing::HasSubstr("datum"))));
   }
 }
 
@@ -186,14 +186,14 @@ MachineNodes three_node_axes() {
 }
 
 /// The reference of X lies between nodes: the condition has the weights of the interpolation.
-TEST(GaugeConditions, OfCubicTablesAreZeroAtTheReference) {
+TEST(DatumConditions, OfCubicTablesAreZeroAtTheReference) {
   const auto layout = ParameterLayout::observable_with_one_target({}, three_node_axes());
   const TableOptions cubic{
       .interpolation = {Interpolation::NaturalCubic, Interpolation::NaturalCubic,
                         Interpolation::NaturalCubic},
       .travel = TravelDependence::Backlash};
   const TableBasis basis = *TableBasis::of(*layout, cubic);
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, basis, basis.size() + 6);
+  const Eigen::MatrixXd K = datum_conditions(ModelDatum::G1, basis, basis.size() + 6);
   ASSERT_EQ(K.rows(), 20);
   ASSERT_EQ(K.cols(), static_cast<Eigen::Index>(basis.size() + 6));
   const NodeWeights weights = basis.interpolation(Axis::X).at(0.0);

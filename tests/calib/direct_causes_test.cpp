@@ -31,7 +31,7 @@ class DirectCauses : public ::testing::Test {
 
   /// Identified once: it takes seconds.
   static const tests::otf::MadeRun& machine() {
-    static const auto run = tests::otf::make_run({.in_gauge = true});
+    static const auto run = tests::otf::make_run({.in_datum = true});
     return run;
   }
   static const VolumetricModel& identified() {
@@ -105,7 +105,7 @@ TEST_F(DirectCauses, NamesNothingForAnOffsetOfTheValues) {
 }
 
 TEST_F(DirectCauses, NamesNothingForAnotherMachine) {
-  const auto other = tests::otf::make_run({.seed = 9, .in_gauge = true});
+  const auto other = tests::otf::make_run({.seed = 9, .in_datum = true});
   const auto t = compare(std::vector{measured_table(other, "EXX")}, model_).value().front();
   EXPECT_EQ(t.finding, Finding::Contradicts);
   EXPECT_THAT(t.causes, IsEmpty());

@@ -25,7 +25,7 @@ using tests::direct::measured_table;
 class DirectComparison : public ::testing::Test {
  protected:
   static const tests::otf::MadeRun& machine() {
-    static const auto run = tests::otf::make_run({.in_gauge = true});
+    static const auto run = tests::otf::make_run({.in_datum = true});
     return run;
   }
   static const VolumetricModel& model() {

@@ -19,7 +19,7 @@ using tests::direct::all_measured;
 class DirectVolume : public ::testing::Test {
  protected:
   DirectVolume()
-      : run_(tests::otf::make_run({.in_gauge = true})), model_(tests::joint::model_of(run_)) {}
+      : run_(tests::otf::make_run({.in_datum = true})), model_(tests::joint::model_of(run_)) {}
 
   void add_squareness(std::vector<MeasuredError>& errors, const Vector3& at) const {
     Vector3 first, last;

@@ -125,7 +125,7 @@ Eigen::VectorXd variances_m2(const ScaledDesign& design, const Eigen::MatrixXd& 
 constexpr int kDraws = 2000;
 constexpr double kBound = 0.13;
 
-/// Covariance of G y over random calibrators. G: estimator and gauge in one.
+/// Covariance of G y over random calibrators. G: estimator and datum in one.
 Eigen::MatrixXd over_calibrators_m2(const Observations& o, const Calibrator& c,
                                     const Eigen::MatrixXd& G) {
   std::mt19937_64 random(5);

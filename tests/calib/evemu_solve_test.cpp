@@ -183,7 +183,7 @@ TEST(EvemuSolution, ComesBackFromItsDescriptionBitForBit) {
   EXPECT_EQ(again->V_at(q, Vector3::Zero()), s.model.V_at(q, Vector3::Zero()));
   EXPECT_EQ(again->error_at(q, Vector3::Zero()).cov_V_m2,
             s.model.error_at(q, Vector3::Zero()).cov_V_m2);
-  EXPECT_EQ(again->gauge(), Gauge::Ball1);
+  EXPECT_EQ(again->datum(), ModelDatum::Ball1);
 }
 
 TEST(EvemuSolution, CorrectsACommand) {
@@ -216,7 +216,7 @@ TEST(RotationReference, TurnsAShapeOntoWhatIsKnown) {
   const auto turned = with_rotation_reference(*solve(o), {known, 5e-6});
   ASSERT_TRUE(turned) << turned.error().text;
   EXPECT_TRUE(turned->rotation.referenced);
-  EXPECT_EQ(turned->model.gauge(), Gauge::Ball1);
+  EXPECT_EQ(turned->model.datum(), ModelDatum::Ball1);
   const auto grid = evaluation_grid(turned->model.validity());
   EXPECT_LT(remaining(V, field_of(*turned), grid).rms_m, 0.15e-3);  // 2.3 mm before
   EXPECT_LT(turned->model.error_at({0.5, 0.2, 0.05}, Vector3::Zero()).cov_V_m2.trace(),
@@ -291,17 +291,17 @@ TEST(RotationReference, IsLessCertainWhereItDoesNotFitWell) {
 
   const auto exact = turned(1e-9, 1);
   ASSERT_TRUE(exact);
-  EXPECT_EQ(exact->rotation.reference->widened, 1.0);
+  EXPECT_EQ(exact->rotation.rotation_reference->widened, 1.0);
   std::size_t widened = 0;
 
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const auto noisy = turned(kNoise_m, seed);
-    if (!noisy || noisy->rotation.reference->widened == 1.0) {
+    if (!noisy || noisy->rotation.rotation_reference->widened == 1.0) {
       continue;
     }
     ++widened;
     EXPECT_NEAR(noisy->rotation.cov_rad2.trace() / exact->rotation.cov_rad2.trace(),
-                noisy->rotation.reference->widened, 1e-6);
+                noisy->rotation.rotation_reference->widened, 1e-6);
   }
 
   EXPECT_GT(widened, 0u);
@@ -324,9 +324,9 @@ TEST(RotationReference, MayBeTheBallsThemselvesMeasuredByAnother) {
 
   const auto turned = with_rotation_reference(*solve(o), {points, 5e-6});
   ASSERT_TRUE(turned) << turned.error().text;
-  EXPECT_EQ(turned->rotation.reference->points, points.size());
-  RecordProperty("chi2_per_dof", std::to_string(turned->rotation.reference->chi2 /
-                                                turned->rotation.reference->dof));
+  EXPECT_EQ(turned->rotation.rotation_reference->points, points.size());
+  RecordProperty("chi2_per_dof", std::to_string(turned->rotation.rotation_reference->chi2 /
+                                                turned->rotation.rotation_reference->dof));
 }
 
 TEST(RotationReference, LeavesPointsOutsideTheBallsOutAndNamesThem) {
@@ -339,7 +339,7 @@ TEST(RotationReference, LeavesPointsOutsideTheBallsOutAndNamesThem) {
   const auto turned = with_rotation_reference(s, {points, 5e-6});
 
   ASSERT_TRUE(turned) << turned.error().text;
-  EXPECT_THAT(turned->rotation.reference->outside, testing::ElementsAre(2u));
+  EXPECT_THAT(turned->rotation.rotation_reference->outside, testing::ElementsAre(2u));
   EXPECT_THAT(judge(o, *turned, nullptr, generous())->notes, Contains(HasSubstr("1 of 4 points")));
   points[0].reading_m.z() = 0.5;
   const auto refused = with_rotation_reference(s, {points, 5e-6});
@@ -440,7 +440,7 @@ TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
   near.push_back(o.ball1_m + Vector3(-0.01, 0.01, 0.01));
   near.push_back(o.ball1_m + Vector3(-0.01, -0.01, -0.01));
   const VolumetricModel smaller = *VolumetricModel::from_polynomials(
-      *s.model.polynomials(), Gauge::Ball1, Vector3::Zero(), *ValidityVolume::hull_of(near));
+      *s.model.polynomials(), ModelDatum::Ball1, Vector3::Zero(), *ValidityVolume::hull_of(near));
   const auto held = held_out(o, s.statistics.s_m, &smaller);
   ASSERT_TRUE(held) << held.error().text;
   EXPECT_GT(held->observations_beside_active, 0u);
@@ -460,7 +460,7 @@ TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {
   const Eigen::VectorXd turned =
       m.c_m() + m.design().rotation_about(m.ball1_m()) * Vector3(1e-3, 2e-3, -1e-3);
   const VolumetricModel other = *VolumetricModel::from_polynomials(
-      *PolynomialModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()), Gauge::Ball1,
+      *PolynomialModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()), ModelDatum::Ball1,
       Vector3::Zero(), s.model.validity());
   const auto true_array = held_out(o, s.statistics.s_m, &s.model),
              as_turned = held_out(o, s.statistics.s_m, &other);

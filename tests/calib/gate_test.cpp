@@ -29,8 +29,8 @@ VolumetricModel positioning_model(double step_m) {
   for (Eigen::Index i = 0; i < 4; ++i) {
     U(i) = step_m * static_cast<double>(i);
   }
-  return *VolumetricModel::from_vector(layout, Gauge::G1, std::array{machine.target_offset_m}, U,
-                                       Eigen::MatrixXd::Zero(U.size(), U.size()),
+  return *VolumetricModel::from_vector(layout, ModelDatum::G1, std::array{machine.target_offset_m},
+                                       U, Eigen::MatrixXd::Zero(U.size(), U.size()),
                                        *ValidityVolume::hull_of(tensor_grid(machine.nodes)));
 }
 
@@ -88,7 +88,7 @@ TEST(Gate, ARigidMotionOfVDoesNotCountAsItsSize) {
   const double rotation_rad = 100e-6 / 0.2 * 7.0;
   U.tail<3>() = Vector3(0.0, rotation_rad, rotation_rad);
   const VolumetricModel model =
-      *VolumetricModel::from_vector(layout, Gauge::G2, std::array{machine.target_offset_m}, U,
+      *VolumetricModel::from_vector(layout, ModelDatum::G2, std::array{machine.target_offset_m}, U,
                                     Eigen::MatrixXd::Zero(U.size(), U.size()),
                                     *ValidityVolume::hull_of(tensor_grid(machine.nodes)));
   EXPECT_GT(model.V_at(Vector3(-6.7, -7.0, -7.2), machine.target_offset_m).norm(), 1e-3);
@@ -112,8 +112,8 @@ VolumetricModel grown_model(double growth, double u_m) {
     }
   }
 
-  return *VolumetricModel::from_vector(layout, Gauge::G1, std::array{machine.target_offset_m}, U,
-                                       u_m * u_m * Eigen::MatrixXd::Identity(U.size(), U.size()),
+  return *VolumetricModel::from_vector(layout, ModelDatum::G1, std::array{machine.target_offset_m},
+                                       U, u_m * u_m * Eigen::MatrixXd::Identity(U.size(), U.size()),
                                        *ValidityVolume::hull_of(tensor_grid(machine.nodes)));
 }
 
@@ -153,7 +153,7 @@ VolumetricModel lower_part(const VolumetricModel& whole, double share) {
   for (Vector3& v : corners) {
     v.z() = share * v.z() + (1 - share) * whole.nodes()[2].nodes_m.front();
   }
-  return *VolumetricModel::from_vector(whole.tables()->layout(), whole.gauge(),
+  return *VolumetricModel::from_vector(whole.tables()->layout(), whole.datum(),
                                        whole.tool_offsets_m(), whole.U(), whole.covariance(),
                                        *ValidityVolume::hull_of(corners));
 }
@@ -207,7 +207,7 @@ TEST(Gate, TakesTwoSetupsByHandForOneVolume) {
 }
 
 VolumetricModel with_volume(const VolumetricModel& model, ValidityVolume volume) {
-  return *VolumetricModel::from_vector(model.tables()->layout(), model.gauge(),
+  return *VolumetricModel::from_vector(model.tables()->layout(), model.datum(),
                                        model.tool_offsets_m(), model.U(), model.covariance(),
                                        std::move(volume));
 }
@@ -248,7 +248,7 @@ VolumetricModel thin_slab(double c3_m) {
 
   return *VolumetricModel::from_polynomials(
       *PolynomialModel::of(design, Vector3::Zero(), c, Eigen::MatrixXd::Zero(size, size)),
-      Gauge::Ball1, Vector3::Zero(), *ValidityVolume::hull_of(corners));
+      ModelDatum::Ball1, Vector3::Zero(), *ValidityVolume::hull_of(corners));
 }
 
 TEST(Gate, SeesTheSlopeOfPolynomialsInAThinVolume) {

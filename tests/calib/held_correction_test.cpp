@@ -40,7 +40,7 @@ VolumetricModel random_model(const std::function<bool(const std::string&)>& want
     }
   }
   const std::vector<Vector3> tools{{0.02, -0.015, -0.12}};
-  return VolumetricModel::from_vector(layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
+  return VolumetricModel::from_vector(layout, ModelDatum::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
                                       ValidityVolume::hull_of(corners).value())
       .value();
 }

@@ -218,26 +218,26 @@ TEST(Information, WithoutUndeterminedUnknownsKeepsWhatTheRowsStateAboutTheOthers
   EXPECT_EQ(rest.rows(), 59u);
 }
 
-/// A block with a nuisance, a correlated noise and unknowns in another order.
-Block correlated_block() {
+/// A group with a nuisance, a correlated noise and unknowns in another order.
+ObservationGroup correlated_group() {
   const Rows r = random_rows(12, 4, 5);
-  Block block{.unknowns = {5, 1, 2},
-              .A = r.A.leftCols(3),
-              .L = r.A.rightCols(1),
-              .u_nuisance = {0.3},
-              .y = r.y};
-  block.covariance = Eigen::MatrixXd::Constant(12, 12, 0.2);
-  block.covariance.diagonal().array() += 0.5;
-  return block;
+  ObservationGroup group{.unknowns = {5, 1, 2},
+                         .A = r.A.leftCols(3),
+                         .L = r.A.rightCols(1),
+                         .u_nuisance = {0.3},
+                         .y = r.y};
+  group.covariance = Eigen::MatrixXd::Constant(12, 12, 0.2);
+  group.covariance.diagonal().array() += 0.5;
+  return group;
 }
 
 /// Information matrix when the nuisance is part of the noise: A^T (C + u^2 L L^T)^-1 A.
 TEST(Information, OfABlockCountsItsNuisanceAsNoise) {
-  const Block block = correlated_block();
+  const ObservationGroup group = correlated_group();
   Information information(6);
-  ASSERT_TRUE(information.add(block));
-  const Eigen::MatrixXd C = block.covariance + 0.3 * 0.3 * block.L * block.L.transpose();
-  const Eigen::MatrixXd expected = block.A.transpose() * C.ldlt().solve(block.A);
+  ASSERT_TRUE(information.add(group));
+  const Eigen::MatrixXd C = group.covariance + 0.3 * 0.3 * group.L * group.L.transpose();
+  const Eigen::MatrixXd expected = group.A.transpose() * C.ldlt().solve(group.A);
   const Eigen::MatrixXd H = information.R().transpose() * information.R();
   const std::vector<Eigen::Index> at{5, 1, 2};
   EXPECT_LT(difference(H(at, at), expected), kRounding);
@@ -246,13 +246,13 @@ TEST(Information, OfABlockCountsItsNuisanceAsNoise) {
 }
 
 TEST(Information, OfABlockWithoutPriorIsThatOfAnUnknownNuisance) {
-  Block block = correlated_block();
-  block.u_nuisance = {kNoPrior};
-  block.covariance = Eigen::VectorXd::Constant(12, 4.0);
+  ObservationGroup group = correlated_group();
+  group.u_nuisance = {kNoPrior};
+  group.covariance = Eigen::VectorXd::Constant(12, 4.0);
   Information information(6);
-  ASSERT_TRUE(information.add(block));
+  ASSERT_TRUE(information.add(group));
   Eigen::MatrixXd all(12, 4);
-  all << block.A, block.L;
+  all << group.A, group.L;
   const Eigen::MatrixXd expected = schur_complement(0.25 * all.transpose() * all, {0, 1, 2}, {3});
   const std::vector<Eigen::Index> at{5, 1, 2};
   const Eigen::MatrixXd H = information.R().transpose() * information.R();
@@ -262,13 +262,13 @@ TEST(Information, OfABlockWithoutPriorIsThatOfAnUnknownNuisance) {
 
 TEST(Information, RefusesABlockOfWrongSize) {
   Information information(3);
-  Block block = correlated_block();  // unknown 5 of 3
-  EXPECT_EQ(information.add(block).error().code, ErrorCode::BadInput);
-  block.unknowns = {0, 1};
-  EXPECT_EQ(information.add(block).error().code, ErrorCode::BadInput);
-  block.unknowns = {0, 1, 2};
-  block.covariance(0, 0) = -1.0;
-  EXPECT_EQ(information.add(block).error().code, ErrorCode::DegenerateGeometry);
+  ObservationGroup group = correlated_group();  // unknown 5 of 3
+  EXPECT_EQ(information.add(group).error().code, ErrorCode::BadInput);
+  group.unknowns = {0, 1};
+  EXPECT_EQ(information.add(group).error().code, ErrorCode::BadInput);
+  group.unknowns = {0, 1, 2};
+  group.covariance(0, 0) = -1.0;
+  EXPECT_EQ(information.add(group).error().code, ErrorCode::DegenerateGeometry);
 }
 
 /// NIST StRD, Longley: observations and certified parameters

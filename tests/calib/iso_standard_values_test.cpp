@@ -48,7 +48,7 @@ ModelDescription iso_zero_model(const AxisNodes& x = iso_nodes()) {
     }
   }
   return VolumetricModel::from_vector(
-             layout, Gauge::G1, tools, Eigen::VectorXd::Zero(n), covariance,
+             layout, ModelDatum::G1, tools, Eigen::VectorXd::Zero(n), covariance,
              ValidityVolume::hull_of(
                  iso_corners({x.nodes_m.front(), -0.3, -0.4}, {x.nodes_m.back(), 0.3, -0.1}))
                  .value())
@@ -292,7 +292,7 @@ TEST(StandardValues, AreThoseOfVForTablesAndPolynomials) {
                                                kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
                                .value();
   const auto model =
-      VolumetricModel::from_polynomials(polynomials, Gauge::Ball1, kIsoTool, volume).value();
+      VolumetricModel::from_polynomials(polynomials, ModelDatum::Ball1, kIsoTool, volume).value();
   expect_values_of_V(model);
   EXPECT_TRUE(iso::standard_values(model)->angular.empty());
 }
@@ -536,7 +536,7 @@ TEST(StandardValues, StraightnessOfAPolynomialIsThatOfItsCurve) {
                          PolynomialModel::of(design, Vector3::Zero(), c,
                                              kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
                              .value(),
-                         Gauge::Ball1, kIsoTool, volume)
+                         ModelDatum::Ball1, kIsoTool, volume)
                          .value();
   // P3 has no part of a line: the reference line is 0.
   const auto values = iso::standard_values(model).value();

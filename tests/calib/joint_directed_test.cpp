@@ -8,7 +8,7 @@
 
 #include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
 #include "abbe/calib/internal/joint/all_parts.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -29,7 +29,7 @@ class DirectedTests : public testing::Test {
       : common_{*abbe::calib::TableBasis::of(abbe::tests::otf::layout_of(
                     abbe::tests::otf::coarse_machine("[w X' b Y Z t]"))),
                 abbe::calib::Vector3::Zero()},
-        c_(abbe::calib::gauge_coordinates(common_.basis)),
+        c_(abbe::calib::datum_coordinates(common_.basis)),
         m_(c_.N.cols()),
         scales_(c_.N.transpose() * axis_scale_columns(common_.basis.layout())) {}
 
@@ -55,7 +55,7 @@ class DirectedTests : public testing::Test {
   std::mt19937_64 random_{3};
   std::normal_distribution<double> normal_;
   joint::CommonTables common_;
-  abbe::calib::GaugeCoordinates c_;
+  abbe::calib::DatumCoordinates c_;
   Eigen::Index m_ = 0;
   Eigen::MatrixXd scales_;
   std::vector<Eigen::VectorXd> estimates_;

@@ -3,16 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/joint/identify.hpp"
 #include "otf_run.hpp"
 
 namespace {
 namespace joint = abbe::calib::joint;
 using abbe::calib::ErrorCode;
-using abbe::calib::Gauge;
 using abbe::calib::Interpolation;
 using abbe::calib::MachineNodes;
+using abbe::calib::ModelDatum;
 using abbe::calib::TableBasis;
 using abbe::calib::TableOptions;
 using abbe::calib::Vector3;
@@ -32,11 +32,11 @@ VolumetricModel zero_model(const std::string& chain = "[w X' b Y Z (C1) t]",
   machine.nodes = nodes;
   const TableBasis basis =
       *TableBasis::of(abbe::tests::otf::layout_of(machine), TableOptions::all_axes(kind));
-  const Eigen::MatrixXd N = abbe::calib::gauge_coordinates(basis).N;
+  const Eigen::MatrixXd N = abbe::calib::datum_coordinates(basis).N;
   const Eigen::MatrixXd C = 1e-12 * N * N.transpose();
   const std::array<Vector3, 4> hull{Vector3(0, 0, 0), Vector3(0.1, 0, 0), Vector3(0, 0.1, 0),
                                     Vector3(0, 0, -0.1)};
-  return *VolumetricModel::from_vector(basis.layout(), Gauge::G1, std::array{kErrorsTool_m},
+  return *VolumetricModel::from_vector(basis.layout(), ModelDatum::G1, std::array{kErrorsTool_m},
                                        Eigen::VectorXd::Zero(N.rows()), 0.5 * (C + C.transpose()),
                                        *abbe::calib::ValidityVolume::hull_of(hull), kind);
 }
@@ -78,7 +78,7 @@ TEST(JointErrors, StateWhatModelHasNoCommonTables) {
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   const std::array<Vector3, 2> tools{kErrorsTool_m, Vector3::Zero()};
   const VolumetricModel two =
-      *VolumetricModel::from_vector(layout, Gauge::G1, tools, Eigen::VectorXd::Zero(n),
+      *VolumetricModel::from_vector(layout, ModelDatum::G1, tools, Eigen::VectorXd::Zero(n),
                                     Eigen::MatrixXd::Zero(n, n), model.validity());
   EXPECT_EQ(joint::tables_of(two).error().text,
             "joint identification: the model has 2 tool offsets, must have one");
@@ -86,7 +86,7 @@ TEST(JointErrors, StateWhatModelHasNoCommonTables) {
               HasSubstr("(run 2)"));
 }
 
-/// Half the backlash is common to all runs and is no part of the gauge's coordinates.
+/// Half the backlash is common to all runs and is no part of the datum's coordinates.
 TEST(JointErrors, RefuseBacklashInTheCovariance) {
   const VolumetricModel model = zero_model();
   const auto& layout = model.tables()->layout();
@@ -94,7 +94,7 @@ TEST(JointErrors, RefuseBacklashInTheCovariance) {
   half.head(static_cast<Eigen::Index>(layout.node_count(layout.tables()[0].motion.axis)))
       .setConstant(1e-6);
   const VolumetricModel with =
-      *VolumetricModel::from_vector(layout, Gauge::G1, std::array{kErrorsTool_m}, model.U(),
+      *VolumetricModel::from_vector(layout, ModelDatum::G1, std::array{kErrorsTool_m}, model.U(),
                                     model.covariance() + half * half.transpose(), model.validity());
 
   ASSERT_TRUE(joint::tables_of(model));

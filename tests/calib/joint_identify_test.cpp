@@ -40,7 +40,7 @@ struct OneMachine {
   /// The run with its parameters changed: a mistake on the way to the joint identification.
   [[nodiscard]] joint::Part run_part(const Eigen::VectorXd& U) const {
     const VolumetricModel changed = *VolumetricModel::from_vector(
-        common.basis.layout(), abbe::calib::Gauge::G1, of_run.tool_offsets_m(), U,
+        common.basis.layout(), abbe::calib::ModelDatum::G1, of_run.tool_offsets_m(), U,
         of_run.covariance(), of_run.validity());
     return *joint::part_of_run("run", changed, common);
   }
@@ -84,11 +84,11 @@ TEST(JointIdentification, PartsOfOneMachineAgreeAndTheModelIsNowhereLessCertain)
       EXPECT_LE(of_joint, of_run * (1.0 + 1e-9));
     }
 
-    // The truth in the gauge of the model; normalised by the covariance of the free coordinates.
+    // The truth in the datum of the model; normalised by the covariance of the free coordinates.
     Eigen::VectorXd U = Eigen::VectorXd::Zero(m.run.truth.size() + 6);
     U.head(m.run.truth.size()) = m.run.truth;
     const Eigen::VectorXd truth =
-        abbe::calib::to_gauge(abbe::calib::Gauge::G1, m.common.basis.layout(),
+        abbe::calib::to_datum(abbe::calib::ModelDatum::G1, m.common.basis.layout(),
                               std::array{m.common.tool_offset_m}, U)
             ->head(m.run.truth.size());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(model.covariance());

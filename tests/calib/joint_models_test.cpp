@@ -9,7 +9,7 @@
 #include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
 #include "abbe/calib/internal/joint/left_out_rotations.hpp"
 #include "abbe/calib/internal/joint/pair_problem.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/internal/statistics/chi2_tail.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
 #include "joint_parts.hpp"
@@ -28,7 +28,7 @@ using testing::SizeIs;
 
 const Vector3 kModelTool_m(0.02, -0.015, -0.12);
 
-/// Models of one machine: equal truth, independent noise of `u_m` per coordinate of the gauge.
+/// Models of one machine: equal truth, independent noise of `u_m` per coordinate of the datum.
 struct ModelsOfOneMachine {
   std::mt19937_64 random{7};  // before truth, which is drawn from it
   TableBasis basis;
@@ -39,7 +39,7 @@ struct ModelsOfOneMachine {
       : basis(*TableBasis::of(
             abbe::tests::otf::layout_of(abbe::tests::otf::coarse_machine("[w X' b Y Z (C1) t]")),
             TableOptions::all_axes(kind))),
-        N(abbe::calib::gauge_coordinates(basis).N),
+        N(abbe::calib::datum_coordinates(basis).N),
         truth(N * draw(30e-6)) {}
 
   Eigen::VectorXd draw(double sigma) {
@@ -49,7 +49,8 @@ struct ModelsOfOneMachine {
   [[nodiscard]] VolumetricModel with(const Eigen::VectorXd& U, const Eigen::MatrixXd& C,
                                      const Vector3& tool_m = kModelTool_m) const {
     return *VolumetricModel::from_vector(
-        basis.layout(), abbe::calib::Gauge::G1, std::array{tool_m}, U, 0.5 * (C + C.transpose()),
+        basis.layout(), abbe::calib::ModelDatum::G1, std::array{tool_m}, U,
+        0.5 * (C + C.transpose()),
         *abbe::calib::ValidityVolume::hull_of(abbe::calib::tensor_grid(basis.layout().nodes())),
         basis.interpolation(Axis::X).kind());
   }
@@ -191,10 +192,10 @@ TEST(JointModels, AnEstimatedNoiseMayBeTooSmallByItsTwoPercentQuantile) {
 
 /// The reference of X (0) is between nodes: the condition of cubic tables contains other nodes than
 /// that of linear ones.
-TEST(JointModels, LeftOutRotationsAreInTheGaugeOfCubicTables) {
+TEST(JointModels, LeftOutRotationsAreInTheDatumOfCubicTables) {
   const ModelsOfOneMachine m(Interpolation::NaturalCubic);
   const Eigen::MatrixXd K =
-      abbe::calib::gauge_conditions(abbe::calib::Gauge::G1, m.basis, m.basis.size());
+      abbe::calib::datum_conditions(abbe::calib::ModelDatum::G1, m.basis, m.basis.size());
   const auto effect =
       joint::LeftOutRotations(m.common(), Vector3(0.03, 0.02, -0.05)).of_parameters();
   ASSERT_TRUE(effect);
@@ -237,7 +238,7 @@ TEST(JointModels, ErrorsOfTheArrayArePairedByBall) {
 /// difference and its uncertainty are those of the two rows that contain it.
 TEST(JointModels, ADifferenceKeepsItsRowsWhereBothPartsAreIncomplete) {
   const ModelsOfOneMachine m(Interpolation::Linear);
-  const abbe::calib::GaugeCoordinates c = abbe::calib::gauge_coordinates(m.basis);
+  const abbe::calib::DatumCoordinates c = abbe::calib::datum_coordinates(m.basis);
   const auto& EXX = c.groups.front();
   ASSERT_EQ(EXX.name, "EXX");
   ASSERT_EQ(EXX.size, 3);
@@ -266,7 +267,7 @@ TEST(JointModels, ADifferenceKeepsItsRowsWhereBothPartsAreIncomplete) {
 /// The scales of the machine are in the run and in the array.
 TEST(JointModels, RunAndArrayShareTheScales) {
   constexpr double kScale = 10e-6;
-  const auto run = abbe::tests::otf::make_run({.in_gauge = true});
+  const auto run = abbe::tests::otf::make_run({.in_datum = true});
   ASSERT_EQ(run.machine.target_offset_m, kModelTool_m);
   ModelsOfOneMachine m(Interpolation::Linear);
   m.truth = run.truth;

@@ -13,11 +13,11 @@
 
 namespace {
 namespace joint = abbe::calib::joint;
-using abbe::calib::GaugeCoordinates;
+using abbe::calib::DatumCoordinates;
 using abbe::tests::otf::coarse_machine;
 using abbe::tests::otf::layout_of;
 
-/// Estimates of the coordinates e of the gauge with their covariance, and the effect of an error
+/// Estimates of the coordinates e of the datum with their covariance, and the effect of an error
 /// that parts may share.
 struct Estimate {
   Eigen::VectorXd e;
@@ -29,7 +29,7 @@ class PairProblem : public testing::Test {
  protected:
   PairProblem()
       : basis_(*abbe::calib::TableBasis::of(layout_of(coarse_machine("[w X' b Y Z t]")))),
-        c_(abbe::calib::gauge_coordinates(basis_)),
+        c_(abbe::calib::datum_coordinates(basis_)),
         m_(c_.N.cols()) {}
 
   [[nodiscard]] Eigen::VectorXd draw(Eigen::Index size) {
@@ -71,7 +71,7 @@ class PairProblem : public testing::Test {
   std::mt19937_64 random_{11};
   std::normal_distribution<double> normal_;
   abbe::calib::TableBasis basis_;
-  GaugeCoordinates c_;
+  DatumCoordinates c_;
   Eigen::Index m_ = 0;
 };
 

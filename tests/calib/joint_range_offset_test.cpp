@@ -31,7 +31,7 @@ constexpr double kUOffset_m = 50e-6;
 /// A run whose ranges are all too long by `offset_m`, with the prior `u_m`.
 MadeRun run_with_offset(double offset_m, unsigned noise_seed, double u_m = kUOffset_m) {
   MadeRun run =
-      make_run({.seed = 3, .noise_seed = noise_seed, .error_scale_m = 10e-6, .in_gauge = true});
+      make_run({.seed = 3, .noise_seed = noise_seed, .error_scale_m = 10e-6, .in_datum = true});
   for (otf::TrackerObservation& sample : run.samples) {
     sample.p_tracker_m *= 1.0 + offset_m / sample.p_tracker_m.norm();
   }

@@ -43,7 +43,7 @@ HeldOutFigures figures_of(const Identification& found, const VolumetricModel* ac
 }
 
 VolumetricModel with_tables(const Identification& found, const Eigen::VectorXd& U) {
-  return VolumetricModel::from_vector(found.observations.basis, Gauge::G1,
+  return VolumetricModel::from_vector(found.observations.basis, ModelDatum::G1,
                                       found.model.tool_offsets_m(), U, found.solution.covariance,
                                       found.model.validity())
       .value();
@@ -115,9 +115,9 @@ TEST(MfbJudge, ComparesWithTheActiveModelAtTheSamePoints) {
 TEST(MfbJudge, ComparesWithAnActiveModelOfOneTool) {
   const Identification& found = usual_identification();
   const std::vector<Vector3> one_tool{found.observations.plan.measurements.front().tool_offset_m};
-  const auto model =
-      VolumetricModel::from_vector(found.observations.basis, Gauge::G1, one_tool, found.solution.U,
-                                   found.solution.covariance, found.model.validity());
+  const auto model = VolumetricModel::from_vector(
+      found.observations.basis, ModelDatum::G1, one_tool, found.solution.U,
+      found.solution.covariance, found.model.validity());
   const HeldOutFigures figures = figures_of(found, &*model);
   ASSERT_TRUE(figures.active);
   EXPECT_LT(*figures.active, *figures.candidate_beside_active);

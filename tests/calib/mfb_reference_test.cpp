@@ -59,7 +59,7 @@ Eigen::Index parameter_of(const ParameterLayout& layout, const std::string& name
   return static_cast<Eigen::Index>(table->offset) + std::stoi(name.substr(4));
 }
 
-TEST(MfbReference, JointAdjustmentAgrees) {
+TEST(MfbReference, SimultaneousAdjustmentAgrees) {
   constexpr double kTolerance_um = 0.01;
   const json reference_file = reference("identification_reference.json");
   for (const json& c : reference_file.at("cases")) {

@@ -44,7 +44,7 @@ TEST(LegAssignment, IsNotConfusedByLegsThatCross) {
   EXPECT_EQ(assign_legs(points, path, 0.02).value(), truth);
 }
 
-TEST(LegAssignment, GoesOnThroughLostBlocks) {
+TEST(LegAssignment, GoesOnThroughLostSegments) {
   const Path path{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}};
   const double nan = std::nan("");
   std::vector<Vector3> points{{0.1, 0, 0},     {0.5, 0, 0}, {nan, nan, nan},
@@ -93,37 +93,37 @@ TEST(LegAssignment, IsTheCheapestOfAll) {
     for (int i = 0; i <= m; ++i) path.vertices_m.push_back(place());
     for (int i = 0; i < n; ++i) points.push_back(place());
     EXPECT_EQ(assign_legs(points, path, 0.02).value(), cheapest(points, path))
-        << n << " blocks, " << m << " legs";
+        << n << " segments, " << m << " legs";
   }
 }
 
-TEST(LegAssignment, NeedsABlockForEveryLeg) {
+TEST(LegAssignment, NeedsASegmentForEveryLeg) {
   const Path path{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}};
   EXPECT_FALSE(assign_legs(std::vector<Vector3>{{0, 0, 0}}, path, 0.02));
 }
 
-/// Case A from its published block means; the machine's positions at the ends are computed with the
-/// rough transform.
-BlockSeries case_a_series(const ReferenceBlocks& blocks) {
+/// Case A from its published segment means; the machine's positions at the ends are computed with
+/// the rough transform.
+SegmentSeries case_a_series(const ReferenceSegments& segments) {
   const RigidTransform rough = case_a_rough_alignment_noisy(), fine = case_a_alignment(true);
   const Path path = case_a_path();
   const Vector3 t = case_a_machine().target_offset_m;
   const Vector3 start = rough.R.transpose() * (path.vertices_m.front() + t - rough.t_m);
   const Vector3 end = fine.R.transpose() * (path.vertices_m.back() + t - fine.t_m);
-  return *blocks_from_means(blocks.means_tracker_m, start, end, {});
+  return *segments_from_means(segments.means_tracker_m, start, end, {});
 }
 
-TEST(Alignment, OfTheReferenceBlocksIsThePrototypes) {
-  const ReferenceBlocks blocks = case_a_blocks();
-  const Result<Alignment> a = align(case_a_series(blocks), case_a_machine(), case_a_path(), {});
+TEST(Alignment, OfTheReferenceSegmentsIsThePrototypes) {
+  const ReferenceSegments segments = case_a_segments();
+  const Result<Alignment> a = align(case_a_series(segments), case_a_machine(), case_a_path(), {});
   ASSERT_TRUE(a) << a.error().text;
   const RigidTransform reference = case_a_alignment(true);
   // The means are printed to 1e-9 m and the end is not a measured one; with samples the agreement
   // is 1e-8, see CaseAStream.
   EXPECT_LT((a->T_machine_tracker.R - reference.R).cwiseAbs().maxCoeff(), 3e-8);
   EXPECT_LT((a->T_machine_tracker.t_m - reference.t_m).cwiseAbs().maxCoeff(), 3e-8);
-  EXPECT_EQ(a->leg, blocks.leg);
-  EXPECT_EQ(a->used, blocks.used);
+  EXPECT_EQ(a->leg, segments.leg);
+  EXPECT_EQ(a->used, segments.used);
   EXPECT_EQ(std::count(a->used.begin(), a->used.end(), true), 4663);
   EXPECT_NEAR(a->last_rms_m, 63.4036e-6, 0.001e-6);
 }
@@ -133,7 +133,7 @@ struct Refusal {
   std::string text;
 };
 Refusal refusal(const MadeRun& run, const Path& path) {
-  const auto a = align(*make_blocks(run.samples, run.options), run.machine, path, run.options);
+  const auto a = align(*make_segments(run.samples, run.options), run.machine, path, run.options);
   return a ? Refusal{{}, "accepted"} : Refusal{a.error().code, a.error().text};
 }
 

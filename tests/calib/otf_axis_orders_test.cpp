@@ -50,8 +50,8 @@ INSTANTIATE_TEST_SUITE_P(Chains, AxisOrder,
                                          "[w Y' Z' X' b t]", "[w Z' b Y X (C1) t]"));
 
 TEST_P(AxisOrder, IsIdentifiedExactlyFromExactSamples) {
-  MadeRun run = make_run({.noise_factor = 0.0, .in_gauge = true, .chain = GetParam()});
-  run.options.estimator = Estimator::Joint;
+  MadeRun run = make_run({.noise_factor = 0.0, .in_datum = true, .chain = GetParam()});
+  run.options.estimator = Estimator::Simultaneous;
   const auto found = identify(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(found) << found.error().text;
   const auto& statistics = found->solution.statistics;
@@ -71,7 +71,7 @@ struct Normalised {
         scale.asDiagonal() * model.covariance() * scale.asDiagonal());
     const Eigen::VectorXd along =
         eigen.eigenvectors().transpose() * scale.asDiagonal() * (model.U() - truth);
-    constexpr double kFixed = 1e-9;  // relative variance of a combination that the gauge fixes
+    constexpr double kFixed = 1e-9;  // relative variance of a combination that the datum fixes
     for (Eigen::Index i = 0; i < along.size(); ++i) {
       if (const double variance = eigen.eigenvalues()(i); variance > kFixed) {
         squares += along(i) * along(i) / variance;
@@ -87,7 +87,7 @@ TEST_P(AxisOrder, HasTheErrorsThatItStates) {
     const MadeRun run = make_run({.seed = seed,
                                   .noise_seed = seed,
                                   .error_scale_m = 10e-6,
-                                  .in_gauge = true,
+                                  .in_datum = true,
                                   .chain = GetParam()});
     const auto found = identify(run.samples, run.machine, run.path, run.noise, run.options);
     ASSERT_TRUE(found) << found.error().text;

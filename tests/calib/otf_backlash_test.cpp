@@ -83,7 +83,7 @@ TEST(AxisTravelOfAPath, OfAStandstillIsThatWhichReachedIt) {
 
 class BacklashOfARun : public testing::TestWithParam<Estimator> {};
 INSTANTIATE_TEST_SUITE_P(OtfEstimators, BacklashOfARun,
-                         testing::Values(Estimator::TwoStep, Estimator::Joint));
+                         testing::Values(Estimator::TwoStep, Estimator::Simultaneous));
 
 TEST_P(BacklashOfARun, IsFoundWithItsSignAndTheModelIsTheMeanOfBothDirections) {
   for (unsigned seed = 1; seed <= repetitions(3u); ++seed) {
@@ -298,8 +298,8 @@ TEST(BacklashNames, AreReadAsWritten) {
   EXPECT_EQ(backlash_named("some"), std::nullopt);
 }
 
-/// Case C of the reference data: caseC_tables.csv and caseC_backlash.csv hold the truth; blocks and
-/// corner as in ref.json.
+/// Case C of the reference data: caseC_tables.csv and caseC_backlash.csv hold the truth; segments
+/// and corner as in ref.json.
 class CaseC : public testing::TestWithParam<Estimator> {
  protected:
   void SetUp() override {
@@ -317,7 +317,7 @@ class CaseC : public testing::TestWithParam<Estimator> {
 
   [[nodiscard]] Result<Identification> identified(TravelDependence backlash) const {
     Options options;
-    options.block_samples = 20;
+    options.segment_samples = 20;
     options.corner_m = 0.02;
     options.backlash = backlash;
     options.estimator = GetParam();
@@ -341,9 +341,9 @@ class CaseC : public testing::TestWithParam<Estimator> {
   std::vector<ReferenceRow> backlash_;
 };
 INSTANTIATE_TEST_SUITE_P(OtfEstimators, CaseC,
-                         testing::Values(Estimator::TwoStep, Estimator::Joint));
+                         testing::Values(Estimator::TwoStep, Estimator::Simultaneous));
 
-/// ref.json, cases.C.estimated.mae: 0.347 um with the joint estimator.
+/// ref.json, cases.C.estimated.mae: 0.347 um with the simultaneous estimator.
 TEST_P(CaseC, HasTheErrorOfThePrototypeAndEveryBacklash) {
   const auto id = identified(TravelDependence::Backlash);
   ASSERT_TRUE(id) << id.error().text;
@@ -359,8 +359,8 @@ TEST_P(CaseC, HasTheErrorOfThePrototypeAndEveryBacklash) {
   }
 }
 
-/// ref.json, cases.C.ignored.mae: 5.949 um with rows of independent noise. Prewhitening (Joint)
-/// takes a part of the backlash for correlated noise.
+/// ref.json, cases.C.ignored.mae: 5.949 um with rows of independent noise. Prewhitening
+/// (Simultaneous) takes a part of the backlash for correlated noise.
 TEST_P(CaseC, IsWrongByMicrometresWithoutBacklash) {
   const auto id = identified(TravelDependence::None);
   ASSERT_TRUE(id) << id.error().text;

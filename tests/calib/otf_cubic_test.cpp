@@ -20,7 +20,7 @@ Result<Identification> identified_cubic(const MadeRun& run) {
   return identify(run.samples, run.machine, run.path, run.noise, run.options);
 }
 
-/// At the nodes, where linear and cubic tables have the same V. Without the rigid motion: the gauge
+/// At the nodes, where linear and cubic tables have the same V. Without the rigid motion: the datum
 /// of the truth is that of linear tables, which differs where the reference is between nodes.
 double largest_cubic_error_m(const MadeRun& run, const VolumetricModel& model) {
   std::vector<Vector3> points = tensor_grid(run.machine.nodes);
@@ -36,8 +36,8 @@ TEST(CubicTables, AreIdentifiedExactlyFromExactSamples) {
         std::pair{"[w b Z X Y (C1) t]", Interpolation::NaturalCubic},
         std::pair{"[w X' b Y Z (C1) t]", Interpolation::NotAKnotCubic}}) {
     MadeRun run =
-        make_run({.noise_factor = 0.0, .in_gauge = true, .chain = chain, .interpolation = kind});
-    run.options.estimator = Estimator::Joint;
+        make_run({.noise_factor = 0.0, .in_datum = true, .chain = chain, .interpolation = kind});
+    run.options.estimator = Estimator::Simultaneous;
     const auto found = identified_cubic(run);
     ASSERT_TRUE(found) << found.error().text;
     EXPECT_EQ(found->solution.model.interpolation(), kind);
@@ -85,7 +85,7 @@ TEST(CubicTables, WinAgainstAnActiveModelOfLinearOnes) {
 }
 
 TEST(CubicTables, OfTwoRunsAreTestedForDriftAndJoined) {
-  MadeRunOptions made{.seed = 5, .in_gauge = true, .interpolation = Interpolation::NaturalCubic};
+  MadeRunOptions made{.seed = 5, .in_datum = true, .interpolation = Interpolation::NaturalCubic};
   const auto first = identified_cubic(make_run(made));
   made.noise_seed = 2;
   const auto second = identified_cubic(make_run(made));

@@ -20,7 +20,7 @@ constexpr double kSecondsOfStandstill = 1.0;  // at 250 points per second
 
 VolumetricModel model_at_feed(double feed_mm_per_min, unsigned noise_seed) {
   const MadeRun run = tests::otf::make_run(
-      {.noise_seed = noise_seed, .in_gauge = true, .speed_m_s = feed_mm_per_min * 1e-3 / 60.0});
+      {.noise_seed = noise_seed, .in_datum = true, .speed_m_s = feed_mm_per_min * 1e-3 / 60.0});
   return identify(run.samples, run.machine, run.path, run.noise, run.options)
       .value()
       .solution.model;
@@ -33,7 +33,7 @@ struct ReferencePoints {
 };
 
 ReferencePoints reference_points() {
-  const MadeRun run = tests::otf::make_run({.in_gauge = true});
+  const MadeRun run = tests::otf::make_run({.in_datum = true});
   std::mt19937_64 random(77);
   const ParameterLayout layout = tests::otf::layout_of(run.machine);
   const Vector3& t = run.machine.target_offset_m;

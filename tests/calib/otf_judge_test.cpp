@@ -101,8 +101,9 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
     }
   }
 
-  const VolumetricModel active = *VolumetricModel::from_vector(
-      layout, Gauge::G1, m.tool_offsets_m(), U, m.covariance(), *ValidityVolume::hull_of(lower));
+  const VolumetricModel active =
+      *VolumetricModel::from_vector(layout, ModelDatum::G1, m.tool_offsets_m(), U, m.covariance(),
+                                    *ValidityVolume::hull_of(lower));
   const auto held = held_out(id.observations, &active, run.options);
   ASSERT_TRUE(held);
   EXPECT_GT(held->observations_beside_active, 0u);
@@ -114,29 +115,29 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
               Contains(HasSubstr("outside its validity volume")));
 }
 
-TEST(Judge, DoesNotDependOnTheGaugeOfTheActiveModel) {
+TEST(Judge, DoesNotDependOnTheDatumOfTheActiveModel) {
   const MadeRun run = make_run({.seed = 1});
   const Identification id = identified(run);
   const VolumetricModel& model = id.solution.model;
 
-  // The same machine in another gauge: any unobservable combination is added.
+  // The same machine in another datum: any unobservable combination is added.
   const Eigen::MatrixXd N =
       unobservable_combinations(model.tables()->layout(), std::array{run.machine.target_offset_m});
   const auto n = static_cast<Eigen::Index>(model.tables()->layout().model_size());
   const Eigen::VectorXd shift = N.rowwise().sum() / N.cwiseAbs().maxCoeff() * 1e-4;
   const VolumetricModel shifted = *VolumetricModel::from_vector(
-      model.tables()->layout(), Gauge::G1, model.tool_offsets_m(), model.U() + shift.head(n),
+      model.tables()->layout(), ModelDatum::G1, model.tool_offsets_m(), model.U() + shift.head(n),
       model.covariance(), model.validity());
   const double as_stated = held_out(id.observations, &model, run.options)->active.value();
-  const double in_other_gauge = held_out(id.observations, &shifted, run.options)->active.value();
-  EXPECT_NEAR(in_other_gauge, as_stated, 1e-6);
+  const double in_other_datum = held_out(id.observations, &shifted, run.options)->active.value();
+  EXPECT_NEAR(in_other_datum, as_stated, 1e-6);
 }
 
 TEST(Judge, LeavesOutAnActiveModelOfAnotherTool) {
   const MadeRun run = make_run({});
   const Identification id = identified(run);
   const VolumetricModel& m = id.solution.model;
-  const VolumetricModel other = *VolumetricModel::from_vector(m.tables()->layout(), Gauge::G1,
+  const VolumetricModel other = *VolumetricModel::from_vector(m.tables()->layout(), ModelDatum::G1,
                                                               std::array{Vector3(0, 0, -0.5)},
                                                               m.U(), m.covariance(), m.validity());
   EXPECT_FALSE(held_out(id.observations, &other, run.options)->active);
@@ -194,11 +195,11 @@ TEST(Judge, ComparesNothingWhereARigidMotionFitsAnyModel) {
   for (int corner = 0; corner < 8; ++corner) {
     const Vector3 d((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1,
                     (corner & 4) != 0 ? 1 : -1);
-    around.emplace_back(at + 0.012 * d);  // a block is 16 mm long
+    around.emplace_back(at + 0.012 * d);  // a segment is 16 mm long
   }
 
   const VolumetricModel active =
-      *VolumetricModel::from_vector(m.tables()->layout(), Gauge::G1, m.tool_offsets_m(), m.U(),
+      *VolumetricModel::from_vector(m.tables()->layout(), ModelDatum::G1, m.tool_offsets_m(), m.U(),
                                     m.covariance(), *ValidityVolume::hull_of(around));
   ASSERT_TRUE(active.validity().contains(at));
   const auto held = held_out(id.observations, &active, run.options);

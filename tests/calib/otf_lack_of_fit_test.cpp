@@ -38,14 +38,15 @@ TEST(LackOfFit, WhiteNoiseWidensNoCovariance) {
   EXPECT_EQ(id.solution.statistics.variance_factor, 1.0);
 }
 
-// An autocorrelation of rho from block to block divides the information by (1 + rho) / (1 - rho).
+// An autocorrelation of rho from segment to segment divides the information by (1 + rho) / (1 -
+// rho).
 TEST(LackOfFit, CorrelatedNoiseWidensTheCovariance) {
   MadeRun run = make_run({.noise_factor = 0.0});
-  run.options.estimator = Estimator::TwoStep;  // Joint prewhitens
+  run.options.estimator = Estimator::TwoStep;  // Simultaneous prewhitens
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
   const double rho = 0.8,
-               keep = std::pow(rho, 1.0 / static_cast<double>(run.options.block_samples));
+               keep = std::pow(rho, 1.0 / static_cast<double>(run.options.segment_samples));
   Vector3 noise_m = Vector3::Zero();
 
   for (TrackerObservation& sample : run.samples) {

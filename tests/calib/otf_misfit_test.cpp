@@ -41,14 +41,14 @@ Vector3 no_error(const Vector3&) {
 }
 
 MadeRun run_with_error(const MoreError& error, unsigned seed = 1) {
-  // In gauge: rotations of the tables by 200 urad would be strains, which repeat, too.
-  MadeRun run = make_run({.seed = seed, .noise_seed = seed, .in_gauge = true});
+  // In datum: rotations of the tables by 200 urad would be strains, which repeat, too.
+  MadeRun run = make_run({.seed = seed, .noise_seed = seed, .in_datum = true});
   const RigidTransform& T = run.T_machine_tracker;
   for (TrackerObservation& sample : run.samples) {
     const Vector3 q_m = T * sample.p_tracker_m - run.machine.target_offset_m;
     sample.p_tracker_m += T.R.transpose() * error(q_m);
   }
-  run.options.estimator = Estimator::Joint;
+  run.options.estimator = Estimator::Simultaneous;
   return run;
 }
 

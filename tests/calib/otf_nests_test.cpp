@@ -67,7 +67,7 @@ Verdict verdict_on(const NestResult& result) {
 
 /// Squares of the errors of the components of V relative to their standard uncertainties.
 double mean_normalised(const MadeRun& run, const VolumetricModel& model) {
-  constexpr double kFixed_m = 1e-9;  // a component below it is fixed by the gauge
+  constexpr double kFixed_m = 1e-9;  // a component below it is fixed by the datum
   const std::vector<Vector3> points = tensor_grid(run.machine.nodes);
   const std::vector<Vector3> left_m = errors_left(run, model);
   double sum = 0.0, count = 0.0;

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "abbe/calib/internal/otf/identify/observe_run.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -57,8 +57,8 @@ TEST(PathFrame, AlongTheBeamIsAnyPerpendicularPair) {
   EXPECT_NEAR(f.sigma2_m, 4.5e-6, 1e-12);
 }
 
-/// A block that crosses a node: its row is the mean of the rows, not the row of the mean.
-TEST(DesignRows, AreAveragedOverTheBlock) {
+/// A segment that crosses a node: its row is the mean of the rows, not the row of the mean.
+TEST(DesignRows, AreAveragedOverTheSegment) {
   const Machine machine = case_a_machine();
   Observations o{.basis = *TableBasis::of(layout_of(machine)),
                  .target_offset_m = machine.target_offset_m};
@@ -91,11 +91,11 @@ TEST(DesignRows, AreAveragedOverTheBlock) {
   EXPECT_GT((at_mean - mean).norm(), 0.1e-6);  // the error of a row at the mean
 }
 
-TEST(Observe, DividesTheNoiseByTheSamplesOfABlock) {
+TEST(Observe, DividesTheNoiseByTheSamplesOfASegment) {
   const MadeRun run = make_run({});
   const auto o = observe(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(o) << o.error().text;
-  ASSERT_EQ(o->rows.size(), 2 * o->blocks_used);
+  ASSERT_EQ(o->rows.size(), 2 * o->segments_used);
   const Observation& across = o->rows[1];
   const RigidTransform& T = o->alignment.T_machine_tracker;
   const double range_m = (across.axis_position_m + run.machine.target_offset_m - T.t_m).norm();
@@ -103,9 +103,9 @@ TEST(Observe, DividesTheNoiseByTheSamplesOfABlock) {
               1e-3 * across.sigma_m);
 }
 
-TEST(Observe, RefusesBlocksThatStraddleCorners) {
+TEST(Observe, RefusesSegmentsThatStraddleCorners) {
   MadeRun run = make_run({});
-  run.options.block_samples = 100;  // 160 mm at 0.4 m/s
+  run.options.segment_samples = 100;  // 160 mm at 0.4 m/s
   const auto o = observe(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_FALSE(o);
   EXPECT_THAT(o.error().text, HasSubstr("use at most 12"));
@@ -119,7 +119,7 @@ MadeRun slow_run(std::size_t keep) {
     samples.push_back(run.samples[i]);
   }
   run.samples = std::move(samples);
-  run.options.block_samples = suitable_block_samples(run.samples);
+  run.options.segment_samples = suitable_segment_samples(run.samples);
   return run;
 }
 
@@ -128,7 +128,7 @@ TEST(Observe, TakesPointsSixteenMillimetresApart) {
   const Result<Observations> o =
       observe(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(o) << o.error().text;
-  EXPECT_GT(o->blocks_used, o->blocks / 2);
+  EXPECT_GT(o->segments_used, o->segments / 2);
 }
 
 TEST(Observe, RefusesPointsTooFarApartWithTheFactorNeeded) {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -35,11 +35,11 @@ TEST(PlacedResiduals, AreAtTheirPlacesOnThePath) {
   }
 }
 
-/// Mean time of the valid samples of a block.
-double mean_time_s(const MadeRun& run, const Block& block) {
+/// Mean time of the valid samples of a segment.
+double mean_time_s(const MadeRun& run, const Segment& segment) {
   double sum_s = 0.0;
   std::size_t count = 0;
-  for (std::size_t i = block.begin_sample; i < block.end_sample; ++i) {
+  for (std::size_t i = segment.begin_sample; i < segment.end_sample; ++i) {
     if (!run.samples[i].valid) continue;
     sum_s += run.samples[i].time_s;
     ++count;
@@ -47,10 +47,10 @@ double mean_time_s(const MadeRun& run, const Block& block) {
   return sum_s / static_cast<double>(count);
 }
 
-TEST(PlacedResiduals, HaveTheTimeOfTheirBlock) {
+TEST(PlacedResiduals, HaveTheTimeOfTheirSegment) {
   const MadeRun run = make_run({});
-  const BlockSeries series = *make_blocks(run.samples, run.options);
-  const Observations o = *observe_blocks(series, run.machine, run.path, run.noise, run.options);
+  const SegmentSeries series = *make_segments(run.samples, run.options);
+  const Observations o = *observe_segments(series, run.machine, run.path, run.noise, run.options);
   ASSERT_GT(o.rows.size(), 100u);
   const Residuals none{.before_m = std::vector<double>(o.rows.size(), 0.0),
                        .after_m = std::vector<double>(o.rows.size(), 0.0)};
@@ -58,17 +58,17 @@ TEST(PlacedResiduals, HaveTheTimeOfTheirBlock) {
     const auto placed = placed_residuals(rows, none);
     for (std::size_t i = 0; i < placed.size(); ++i) {
       ASSERT_TRUE(placed[i].time_s);
-      EXPECT_NEAR(*placed[i].time_s, mean_time_s(run, series.blocks[o.rows[i].block]), 1e-9);
+      EXPECT_NEAR(*placed[i].time_s, mean_time_s(run, series.segments[o.rows[i].segment]), 1e-9);
       EXPECT_EQ(placed[i].leg, o.rows[i].leg);
     }
   }
 }
 
-TEST(PlacedResiduals, OfBlocksWithoutTimesHaveNone) {
+TEST(PlacedResiduals, OfSegmentsWithoutTimesHaveNone) {
   const MadeRun run = make_run({});
-  BlockSeries series = *make_blocks(run.samples, run.options);
+  SegmentSeries series = *make_segments(run.samples, run.options);
   series.period_s = 0.0;
-  const Observations o = *observe_blocks(series, run.machine, run.path, run.noise, run.options);
+  const Observations o = *observe_segments(series, run.machine, run.path, run.noise, run.options);
   const std::vector<double> zeros(o.rows.size(), 0.0);
   for (const auto& placed : placed_residuals(o, {.before_m = zeros, .after_m = zeros}))
     EXPECT_FALSE(placed.time_s);

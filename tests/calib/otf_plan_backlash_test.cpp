@@ -62,9 +62,10 @@ TEST(PlanObservableWithBacklash, NamesTablesOfLegsThatAreNotUsed) {
 
 /// The same is refused after the run, with the same legs.
 TEST(PlanObservableWithBacklash, RefusesWhatTheAdjustmentWouldRefuse) {
-  for (const auto& [estimator, kind] : {std::pair{Estimator::TwoStep, TravelDependence::Backlash},
-                                        std::pair{Estimator::Joint, TravelDependence::Backlash},
-                                        std::pair{Estimator::TwoStep, TravelDependence::Tables}}) {
+  for (const auto& [estimator, kind] :
+       {std::pair{Estimator::TwoStep, TravelDependence::Backlash},
+        std::pair{Estimator::Simultaneous, TravelDependence::Backlash},
+        std::pair{Estimator::TwoStep, TravelDependence::Tables}}) {
     const MadeRunOptions wanted;
     MadeRun run = make_run(wanted);
     run.path = path_with_a_late_start_of_Z(run.machine.nodes);
@@ -130,7 +131,7 @@ TEST(PlanPredictionWithBacklash, AgreesWithTheCovarianceOfARun) {
   for (std::size_t i = 0; i < with->backlash.size(); ++i) {
     const Backlash& b = id->solution.backlash[i];
     EXPECT_EQ(with->backlash[i].name, name(b.motion));
-    // blocks of 10 samples here, of 5 in the prediction: other blocks near the ends of the legs
+    // segments of 10 samples here, of 5 in the prediction: other segments near the ends of the legs
     EXPECT_NEAR(with->backlash[i].max_u, b.u, 0.1 * b.u) << label(b);
   }
 }

@@ -36,7 +36,7 @@ PlannedRun coarse_run() {
 TEST(PlanPrediction, IsTheBoundOfThePrototype) {
   const auto p = predict(case_a_path(), case_a_run());
   ASSERT_TRUE(p) << p.error().text;
-  // ref.json, cases.A.crb_rms_rigidfree_um; blocks begin at other samples there: 0.5 %
+  // ref.json, cases.A.crb_rms_rigidfree_um; segments begin at other samples there: 0.5 %
   EXPECT_NEAR(p->rms_u_m, 0.079285e-6, 0.005 * 0.079285e-6);
   EXPECT_EQ(p->rank, 149u);
   EXPECT_EQ(p->unknowns, 169u);
@@ -82,7 +82,7 @@ void expect_covariance_of_a_run(double u_range_offset_m) {
     for (const Parameter& parameter : parameters) {
       most = parameter.name == table.name ? std::max(most, parameter.u) : most;
     }
-    // blocks of 10 samples here, of 5 in the prediction: other blocks near the ends of the legs
+    // segments of 10 samples here, of 5 in the prediction: other segments near the ends of the legs
     EXPECT_NEAR(table.max_u, most, 0.1 * most) << table.name;
   }
 }
@@ -182,7 +182,7 @@ TEST(PlanObservable, NamesTheTablesThatAPathDoesNotDetermine) {
 }
 
 /// Without legs beyond X = 150 mm only tables of X are missing, and squareness with them: the line
-/// through the ends of EYX and EZX is unknown. No gauge combination is named.
+/// through the ends of EYX and EZX is unknown. No datum combination is named.
 TEST(PlanObservable, NamesOnlyTablesOfAnAxisThatIsDrivenInPart) {
   Path part = case_a_path();
   for (Vector3& q : part.vertices_m) {

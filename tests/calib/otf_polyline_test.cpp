@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -83,7 +83,7 @@ TEST(PathCheck, TakesVerticesAtTheEndsOfTheTravel) {
   EXPECT_TRUE(check(Path{{{-0.1, 0, 0}, {0.5, 0, 0}, {0.5, 0.5, 0.5}}}, travel()));
 }
 
-TEST(BlockLength, IsTheTravelOfEightMillimetres) {
+TEST(SegmentLength, IsTheTravelOfEightMillimetres) {
   for (const double speed_m_s : {0.02, 0.05, 0.2}) {
     std::vector<TrackerObservation> samples;
     for (int i = 0; i < 5000; ++i) {
@@ -92,22 +92,22 @@ TEST(BlockLength, IsTheTravelOfEightMillimetres) {
       samples.push_back(
           {.time_s = time_s, .p_tracker_m = {1.0 + speed_m_s * std::max(0.0, time_s - 2.0), 0, 0}});
     }
-    EXPECT_NEAR(static_cast<double>(suitable_block_samples(samples)), 8.33e-3 / (0.002 * speed_m_s),
-                1.0);
+    EXPECT_NEAR(static_cast<double>(suitable_segment_samples(samples)),
+                8.33e-3 / (0.002 * speed_m_s), 1.0);
   }
 }
 
-TEST(BlockLength, StaysBetweenOneAndAThousand) {
+TEST(SegmentLength, StaysBetweenOneAndAThousand) {
   std::vector<TrackerObservation> standing(1000);
-  EXPECT_EQ(suitable_block_samples(standing), 1000u);
-  EXPECT_EQ(suitable_block_samples({}), 10u);
+  EXPECT_EQ(suitable_segment_samples(standing), 1000u);
+  EXPECT_EQ(suitable_segment_samples({}), 10u);
   std::vector<TrackerObservation> racing;
   for (int i = 0; i < 1000; ++i)
     racing.push_back({.time_s = 0.01 * i, .p_tracker_m = {0.02 * i, 0, 0}});
-  EXPECT_EQ(suitable_block_samples(racing), 1u);
+  EXPECT_EQ(suitable_segment_samples(racing), 1u);
 }
 
-TEST(BlockLength, OfASlowTrackerIgnoresCornersOfThePath) {
+TEST(SegmentLength, OfASlowTrackerIgnoresCornersOfThePath) {
   // 2 mm per sample along legs of 30 mm, back and forth: the chord over 50 samples is shorter.
   std::vector<TrackerObservation> zigzag;
   for (int i = 0; i < 1000; ++i) {
@@ -115,7 +115,7 @@ TEST(BlockLength, OfASlowTrackerIgnoresCornersOfThePath) {
     zigzag.push_back({.time_s = 0.05 * i,
                       .p_tracker_m = {2e-3 * std::min(along, 30 - along), 1e-3 * (i / 15), 1.0}});
   }
-  EXPECT_EQ(suitable_block_samples(zigzag), 4u);
+  EXPECT_EQ(suitable_segment_samples(zigzag), 4u);
 }
 
 }  // namespace

@@ -8,9 +8,9 @@
 #include <random>
 #include <vector>
 
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/internal/otf/observe/row_residuals.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
 #include "otf_run.hpp"
 #include "repetitions.hpp"
@@ -48,7 +48,7 @@ void add_noise(MadeRun& run, const SlowReadings& slow, unsigned seed) {
 MadeRun run_with_slow_noise(const SlowReadings& slow, unsigned seed = 7) {
   MadeRun run = make_run({.noise_seed = seed});
   add_noise(run, slow, 1000 + seed);
-  run.options.estimator = Estimator::Joint;
+  run.options.estimator = Estimator::Simultaneous;
   return run;
 }
 
@@ -59,7 +59,7 @@ Identification identification_with(const MadeRun& run) {
 TEST(IsCorrelated, NotWhiteNoise) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     MadeRun run = make_run({.seed = seed, .noise_seed = seed});
-    run.options.estimator = Estimator::Joint;
+    run.options.estimator = Estimator::Simultaneous;
     const Identification id = identification_with(run);
     EXPECT_FALSE(is_correlated(id.observations, id.solution.residuals.after_m)) << seed;
     EXPECT_EQ(id.solution.statistics.noise_correlation, (std::array{0.0, 0.0}));
@@ -123,11 +123,11 @@ MadeRun small_run() {
   const MadeRunOptions wanted{.noise_seed = 3};
   measure_run(run, wanted);
   add_noise(run, {}, 3);
-  run.options.estimator = Estimator::Joint;
+  run.options.estimator = Estimator::Simultaneous;
   return run;
 }
 
-/// Covariance of the mean of unit slow noise over two blocks whose middles are `apart` from each
+/// Covariance of the mean of unit slow noise over two segments whose middles are `apart` from each
 /// other: the integral of exp(-|t - t'| / tau) over both, divided by the square of the duration.
 double covariance_of_means(double apart_s, double duration_s, double tau_s) {
   const double x = duration_s / tau_s;
@@ -141,7 +141,7 @@ double covariance_of_means(double apart_s, double duration_s, double tau_s) {
 /// Covariance of all rows, by the definition in prewhitening.hpp.
 Eigen::MatrixXd covariance_of(const Observations& o, const TrackerNoise& noise) {
   const auto m = static_cast<Eigen::Index>(o.rows.size());
-  const double duration_s = o.block_s[1] - o.block_s[0];
+  const double duration_s = o.segment_s[1] - o.segment_s[0];
   Eigen::MatrixXd range(m, 1), azimuth(m, 1), elevation(m, 1);
   for (Eigen::Index i = 0; i < m; ++i) {
     const Observation& row = o.rows[static_cast<std::size_t>(i)];
@@ -158,8 +158,8 @@ Eigen::MatrixXd covariance_of(const Observations& o, const TrackerNoise& noise) 
       const Observation &a = o.rows[static_cast<std::size_t>(i)],
                         &b = o.rows[static_cast<std::size_t>(j)];
       C(i, j) = (range(i) * range(j) + azimuth(i) * azimuth(j) + elevation(i) * elevation(j)) *
-                covariance_of_means(std::abs(o.block_s[a.block] - o.block_s[b.block]), duration_s,
-                                    noise.correlation_time);
+                covariance_of_means(std::abs(o.segment_s[a.segment] - o.segment_s[b.segment]),
+                                    duration_s, noise.correlation_time);
     }
     const double sigma_m = o.rows[static_cast<std::size_t>(i)].sigma_m;
     C(i, i) += noise.white_factor * sigma_m * sigma_m;
@@ -187,7 +187,7 @@ Generalised generalised_least_squares(const Observations& o, const Eigen::Matrix
   const Eigen::MatrixXd H = A.transpose() * CA;
   const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd K =
-      (gauge_conditions(Gauge::G1, o.basis, o.unknowns()) * scale.asDiagonal())
+      (datum_conditions(ModelDatum::G1, o.basis, o.unknowns()) * scale.asDiagonal())
           .rowwise()
           .normalized();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal() + K.transpose() * K;
@@ -213,7 +213,7 @@ TEST(Prewhitening, IsGeneralisedLeastSquaresWithTheCovarianceOfAllRows) {
   // The factor of the covariance is estimated again, from the prewhitened residuals.
   const Eigen::ArrayXd stated = model.covariance().diagonal().array(),
                        asked = expected.cofactor.diagonal().head(stated.size()).array();
-  constexpr double kFixed = 1e-20;  // by the gauge: rounding
+  constexpr double kFixed = 1e-20;  // by the datum: rounding
   EXPECT_TRUE(((stated - asked).abs() <= 0.02 * asked.abs() + kFixed).all());
 }
 
@@ -226,15 +226,15 @@ TEST(Prewhitening, LeavesNoCorrelationToWiden) {
   EXPECT_LT(s.variance_factor, 1.3 * s.chi2_per_dof);
 }
 
-/// e^T C^-1 e / n of the errors e of the parameters in the n coordinates that the gauge leaves
+/// e^T C^-1 e / n of the errors e of the parameters in the n coordinates that the datum leaves
 /// free.
 double normalised_squared_error(const MadeRun& run, const Identification& id) {
   Eigen::VectorXd truth =
       Eigen::VectorXd::Zero(static_cast<Eigen::Index>(id.observations.unknowns()));
   truth.head(run.truth.size()) = run.truth;
-  truth = *to_gauge(Gauge::G1, id.observations.layout(), std::array{run.machine.target_offset_m},
-                    truth);
-  const Eigen::MatrixXd N = gauge_coordinates(id.observations.basis).N;
+  truth = *to_datum(ModelDatum::G1, id.observations.layout(),
+                    std::array{run.machine.target_offset_m}, truth);
+  const Eigen::MatrixXd N = datum_coordinates(id.observations.basis).N;
   const VolumetricModel& model = id.solution.model;
   const Eigen::VectorXd e = N.transpose() * (model.U() - truth.head(model.U().size()));
   const Eigen::MatrixXd C = N.transpose() * model.covariance() * N;

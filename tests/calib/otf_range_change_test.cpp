@@ -19,7 +19,7 @@ using testing::Not;
 std::string refusal_with_ranges(const MadeRun& run, double longer_m) {
   std::vector<TrackerObservation> samples = run.samples;
   for (TrackerObservation& s : samples) s.p_tracker_m *= 1.0 + longer_m / s.p_tracker_m.norm();
-  const auto a = align(*make_blocks(samples, run.options), run.machine, run.path, run.options);
+  const auto a = align(*make_segments(samples, run.options), run.machine, run.path, run.options);
   return a ? "accepted" : a.error().text;
 }
 
@@ -46,7 +46,7 @@ TEST(RangeChange, IsNotNamedForAnotherShape) {
   const MadeRun run = make_run({});
   Path other = run.path;
   for (std::size_t i = 0; i < other.vertices_m.size(); i += 3) other.vertices_m[i].x() += 0.02;
-  const auto a = align(*make_blocks(run.samples, run.options), run.machine, other, run.options);
+  const auto a = align(*make_segments(run.samples, run.options), run.machine, other, run.options);
   ASSERT_FALSE(a);
   EXPECT_THAT(a.error().text, Not(HasSubstr("ranges")));
 }

@@ -47,7 +47,7 @@ struct Dense {
 };
 
 /// Rows and prior in one dense least-squares problem; the shortest solution determines the rigid
-/// motion and the gauge.
+/// motion and the datum.
 Dense dense_solution(const Observations& o) {
   const auto rows = static_cast<Eigen::Index>(o.rows.size()),
              n = static_cast<Eigen::Index>(o.unknowns());

@@ -15,7 +15,7 @@ using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 
-/// V of a model minus V of the true tables on the 13 x 11 x 9 grid, gauge G1, rigid unknowns 0.
+/// V of a model minus V of the true tables on the 13 x 11 x 9 grid, datum G1, rigid unknowns 0.
 VectorStatistics grid_error(const VolumetricModel& model) {
   const Machine machine = case_a_machine();
   const ParameterLayout layout = layout_of(machine);
@@ -29,8 +29,8 @@ VectorStatistics grid_error(const VolumetricModel& model) {
   return vector_statistics(left);
 }
 
-/// Solution from the block means alone, for a clone without the stream files.
-Result<Identification> from_block_means(Estimator estimator) {
+/// Solution from the segment means alone, for a clone without the stream files.
+Result<Identification> from_segment_means(Estimator estimator) {
   const RigidTransform T = case_a_alignment(true);
   const Path path = case_a_path();
   const Machine machine = case_a_machine();
@@ -40,15 +40,15 @@ Result<Identification> from_block_means(Estimator estimator) {
   };
 
   const auto series =
-      blocks_from_means(case_a_blocks().means_tracker_m, seen_at(path.vertices_m.front()),
-                        seen_at(path.vertices_m.back()), {});
+      segments_from_means(case_a_segments().means_tracker_m, seen_at(path.vertices_m.front()),
+                          seen_at(path.vertices_m.back()), {});
   Options options;
   options.estimator = estimator;
-  return identify_blocks(*series, machine, path, {}, options);
+  return identify_segments(*series, machine, path, {}, options);
 }
 
-TEST(CaseA, FromItsBlockMeansIsWithinTheAskedError) {
-  const auto id = from_block_means(Estimator::TwoStep);
+TEST(CaseA, FromItsSegmentMeansIsWithinTheAskedError) {
+  const auto id = from_segment_means(Estimator::TwoStep);
   ASSERT_TRUE(id) << id.error().text;
   EXPECT_EQ(id->solution.statistics.rank, 149u);
   EXPECT_LE(grid_error(id->solution.model).mean_m, 0.105e-6);
@@ -59,12 +59,12 @@ TEST(CaseA, FromItsBlockMeansIsWithinTheAskedError) {
 }
 
 /// ref.json, cases.A.noisy.joint_GN3.mae: 0.0995 um.
-TEST(CaseA, JointFromItsBlockMeansHasThePrototypesError) {
-  const auto id = from_block_means(Estimator::Joint);
+TEST(CaseA, SimultaneousFromItsSegmentMeansHasThePrototypesError) {
+  const auto id = from_segment_means(Estimator::Simultaneous);
   ASSERT_TRUE(id) << id.error().text;
   EXPECT_EQ(id->solution.statistics.rank, 149u);
   EXPECT_NEAR(grid_error(id->solution.model).mean_m, 0.099472e-6, 0.05 * 0.099472e-6);
-  const Eigen::VectorXd reference = case_a_tables(TableColumn::NoisyJoint);
+  const Eigen::VectorXd reference = case_a_tables(TableColumn::NoisySimultaneous);
   EXPECT_LT((id->solution.model.U() - reference).cwiseAbs().maxCoeff(), 1e-8);
 }
 
@@ -110,28 +110,31 @@ INSTANTIATE_TEST_SUITE_P(
                            TableColumn::NoiseFreeTwoStep, 0.026e-6},
                     Stream{"caseA_stream_noisy.i32", true, Estimator::TwoStep,
                            TableColumn::NoisyTwoStep, 0.105e-6},
-                    Stream{"caseA_stream_noisefree.i32", false, Estimator::Joint,
-                           TableColumn::NoiseFreeJoint, 0.0004e-6},
-                    Stream{"caseA_stream_noisy.i32", true, Estimator::Joint,
-                           TableColumn::NoisyJoint, 0.1e-6}));
+                    Stream{"caseA_stream_noisefree.i32", false, Estimator::Simultaneous,
+                           TableColumn::NoiseFreeSimultaneous, 0.0004e-6},
+                    Stream{"caseA_stream_noisy.i32", true, Estimator::Simultaneous,
+                           TableColumn::NoisySimultaneous, 0.1e-6}));
 
 TEST_P(CaseAStream, AlignsAsThePrototype) {
-  const RigidTransform reference = GetParam().estimator == Estimator::Joint
-                                       ? case_a_joint_alignment(GetParam().noisy)
+  const RigidTransform reference = GetParam().estimator == Estimator::Simultaneous
+                                       ? case_a_simultaneous_alignment(GetParam().noisy)
                                        : case_a_alignment(GetParam().noisy);
   const Alignment& a = id_->observations.alignment;
   EXPECT_LT((a.T_machine_tracker.R - reference.R).cwiseAbs().maxCoeff(), 1e-8);
   EXPECT_LT((a.T_machine_tracker.t_m - reference.t_m).cwiseAbs().maxCoeff(), 1e-8);
   EXPECT_EQ(a.iterations, 9);
-  EXPECT_EQ(id_->observations.blocks_used, 4663u);
+  EXPECT_EQ(id_->observations.segments_used, 4663u);
 }
 
 TEST_P(CaseAStream, GivesThePrototypesTables) {
   const Eigen::VectorXd reference = case_a_tables(GetParam().tables);
   EXPECT_EQ(id_->solution.statistics.rank, 149u);
-  // With noise the joint estimate differs from the prototype's by 7e-9; its uncertainty is 1e-7.
-  const bool noisy_joint = GetParam().noisy && GetParam().estimator == Estimator::Joint;
-  EXPECT_LT((id_->solution.model.U() - reference).cwiseAbs().maxCoeff(), noisy_joint ? 1e-8 : 1e-9);
+  // With noise the simultaneous estimate differs from the prototype's by 7e-9; its uncertainty is
+  // 1e-7.
+  const bool noisy_simultaneous =
+      GetParam().noisy && GetParam().estimator == Estimator::Simultaneous;
+  EXPECT_LT((id_->solution.model.U() - reference).cwiseAbs().maxCoeff(),
+            noisy_simultaneous ? 1e-8 : 1e-9);
 }
 
 TEST_P(CaseAStream, StatesThePrototypesUncertainty) {
@@ -174,7 +177,7 @@ TEST(CaseAInformation, OfAllSamplesHasThePrototypesNormalEquations) {
   }
 
   const std::vector<TrackerObservation> samples = read_stream(*stream);
-  const std::vector<std::size_t> leg = case_a_blocks().leg;
+  const std::vector<std::size_t> leg = case_a_segments().leg;
   const Machine machine = case_a_machine();
   const Path path = case_a_path();
   const RigidTransform T = case_a_alignment(true);
@@ -183,10 +186,10 @@ TEST(CaseAInformation, OfAllSamplesHasThePrototypesNormalEquations) {
   RowInformation all(none.unknowns());
   Observations o = none;
 
-  for (std::size_t block = 0; block < leg.size(); ++block) {
-    append_samples(o, std::span(samples).subspan(100 * block, 100), path.vertices_m[leg[block]],
-                   path.vertices_m[leg[block] + 1], T, {});
-    if (block + 1 == leg.size() || leg[block + 1] != leg[block]) {
+  for (std::size_t segment = 0; segment < leg.size(); ++segment) {
+    append_samples(o, std::span(samples).subspan(100 * segment, 100), path.vertices_m[leg[segment]],
+                   path.vertices_m[leg[segment] + 1], T, {});
+    if (segment + 1 == leg.size() || leg[segment + 1] != leg[segment]) {
       all += information_of(o);
       o = none;
     }
@@ -204,18 +207,18 @@ TEST(CaseAInformation, FromMomentsHasThePrototypesNormalEquations) {
   }
 
   const std::vector<TrackerObservation> samples = read_stream(*stream);
-  const std::vector<std::size_t> leg = case_a_blocks().leg;
+  const std::vector<std::size_t> leg = case_a_segments().leg;
   const Machine machine = case_a_machine();
   const Path path = case_a_path();
   auto moments = MomentAccumulator::of({*TableBasis::of(layout_of(machine)),
                                         machine.target_offset_m, case_a_alignment(true), Noise{}});
   ASSERT_TRUE(moments) << moments.error().text;
 
-  for (std::size_t block = 0; block < leg.size(); ++block) {
-    if (block == 0 || leg[block] != leg[block - 1]) {
-      moments->begin_leg(path.vertices_m[leg[block]], path.vertices_m[leg[block] + 1]);
+  for (std::size_t segment = 0; segment < leg.size(); ++segment) {
+    if (segment == 0 || leg[segment] != leg[segment - 1]) {
+      moments->begin_leg(path.vertices_m[leg[segment]], path.vertices_m[leg[segment] + 1]);
     }
-    for (std::size_t i = 100 * block; i < 100 * (block + 1); ++i) {
+    for (std::size_t i = 100 * segment; i < 100 * (segment + 1); ++i) {
       moments->add(samples[i].p_tracker_m);
     }
   }

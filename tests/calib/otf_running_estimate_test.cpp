@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
 #include "abbe/calib/otf/live/running_estimate.hpp"
 #include "backlash_run.hpp"
@@ -73,25 +73,25 @@ std::size_t nodes_determined(const TablesSoFar& tables) {
   return sum;
 }
 
-/// The tables of the truth in gauge G1, in the order of the layout.
-Eigen::VectorXd truth_in_gauge(const MadeRun& run) {
+/// The tables of the truth in datum G1, in the order of the layout.
+Eigen::VectorXd truth_in_datum(const MadeRun& run) {
   const ParameterLayout layout = layout_of(run.machine);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   U.head(run.truth.size()) = run.truth;
-  return *to_gauge(Gauge::G1, layout, std::array{run.machine.target_offset_m}, U);
+  return *to_datum(ModelDatum::G1, layout, std::array{run.machine.target_offset_m}, U);
 }
 
-/// Largest |value - other| / u over all nodes with u > 0 that the gauge does not fix.
+/// Largest |value - other| / u over all nodes with u > 0 that the datum does not fix.
 double largest_in_u(const TablesSoFar& tables, const ParameterLayout& layout,
                     const Eigen::VectorXd& other) {
-  constexpr double kFixedByGauge = 1e-8;  // its u is 1e-9
+  constexpr double kFixedByDatum = 1e-8;  // its u is 1e-9
   double largest = 0.0;
   for (std::size_t t = 0; t < tables.tables.size(); ++t) {
     const auto& nodes = tables.tables[t].nodes;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const double true_value = other(static_cast<Eigen::Index>(layout.tables()[t].offset + i));
       const double difference = std::abs(nodes[i].value - true_value);
-      largest = std::max(largest, difference / std::max(nodes[i].u, kFixedByGauge));
+      largest = std::max(largest, difference / std::max(nodes[i].u, kFixedByDatum));
     }
   }
   return largest;
@@ -110,7 +110,7 @@ TEST(RunningEstimate, OfTheCompleteRunAgreesWithTruthAndIdentification) {
   EXPECT_LT(tables->variance_factor, 2.0);
 
   // About 50 values: 4.5 u is exceeded by chance in less than one run of 1000.
-  EXPECT_LT(largest_in_u(*tables, layout, truth_in_gauge(run)), 4.5);
+  EXPECT_LT(largest_in_u(*tables, layout, truth_in_datum(run)), 4.5);
 
   // The identification uses means of 10 samples and other samples near the corners.
   const auto identified = identify(run.samples, run.machine, run.path, run.noise, run.options);
@@ -135,7 +135,7 @@ TEST(RunningEstimate, WithBacklashIsTheMeanOfBothDirections) {
   const auto without = tables_after(run, legs);
   ASSERT_TRUE(with && without) << with.error().text;
 
-  const Eigen::VectorXd truth = truth_in_gauge(run);
+  const Eigen::VectorXd truth = truth_in_datum(run);
   const ParameterLayout layout = layout_of(run.machine);
   double error = 0.0, error_without = 0.0;
   for (std::size_t t = 0; t < with->tables.size(); ++t) {
@@ -169,7 +169,7 @@ TEST(RunningEstimate, OfAFewLegsDeterminesNoTableWithoutEvidence) {
     before = determined;
 
     const ParameterLayout layout = layout_of(run.machine);
-    const Eigen::VectorXd truth = truth_in_gauge(run);
+    const Eigen::VectorXd truth = truth_in_datum(run);
     for (std::size_t t = 0; t < tables->tables.size(); ++t) {
       for (std::size_t i = 0; i < tables->tables[t].nodes.size(); ++i) {
         const NodeSoFar& node = tables->tables[t].nodes[i];

@@ -57,7 +57,7 @@ void add_step(MadeRun& run, const SmoothRunOptions& made, const ErrorMotion& mot
       U(static_cast<Eigen::Index>(table.offset + i)) += step;
     }
   }
-  run.truth = to_gauge(Gauge::G1, layout, std::array{run.machine.target_offset_m}, U)
+  run.truth = to_datum(ModelDatum::G1, layout, std::array{run.machine.target_offset_m}, U)
                   ->head(run.truth.size());
   measure_smooth_run(run, made);
 }
@@ -168,7 +168,7 @@ TEST(SmoothnessPrior, DoesNotSmoothAStepAway) {
   const Eigen::VectorXd error = found->solution.model.U() - run.truth;
   const Eigen::VectorXd u = found->solution.model.covariance().diagonal().cwiseSqrt();
   for (Eigen::Index i = 0; i < error.size(); ++i) {
-    EXPECT_LE(std::abs(error(i)), 4.5 * u(i) + 1e-15) << i;  // u is 0 where the gauge fixes it
+    EXPECT_LE(std::abs(error(i)), 4.5 * u(i) + 1e-15) << i;  // u is 0 where the datum fixes it
   }
 }
 

@@ -49,11 +49,11 @@ TEST(Identification, EndsWhenItIsStoppedWhereverItIs) {
   EXPECT_FALSE(held_out(o, nullptr, run.options));
 }
 
-TEST(Adjustment, MeetsTheGaugeExactlyWhateverItsWeight) {
+TEST(Adjustment, MeetsTheDatumExactlyWhateverItsWeight) {
   const Observations o = observed(make_run({}));
   const RowInformation rows = information_of(o);
   const Adjustment reference = *adjust(rows, o, 1.0);
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, o.basis, o.unknowns());
+  const Eigen::MatrixXd K = datum_conditions(ModelDatum::G1, o.basis, o.unknowns());
 
   for (const double weight : {1e-3, 1e-1, 10.0, 1e3}) {
     const Adjustment a = *adjust(rows, o, weight);
@@ -75,7 +75,7 @@ TEST(Adjustment, KnowsRankAndNullSpaceOfTheData) {
   EXPECT_LT(a.condition, 1e3);
 }
 
-TEST(Adjustment, HasNoUncertaintyWhereTheGaugeFixesAValue) {
+TEST(Adjustment, HasNoUncertaintyWhereTheDatumFixesAValue) {
   const Observations o = observed(make_run({}));
   const Adjustment a = *adjust(information_of(o), o);
   const auto first_straightness =
@@ -132,7 +132,7 @@ TEST(Adjustment, UncertaintyCoversTheTruth) {
   Eigen::VectorXd with_rigid = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
   with_rigid.head(run.truth.size()) = run.truth;
   const Eigen::VectorXd truth =
-      *to_gauge(Gauge::G1, o.layout(), std::array{o.target_offset_m}, with_rigid);
+      *to_datum(ModelDatum::G1, o.layout(), std::array{o.target_offset_m}, with_rigid);
   std::mt19937_64 random(99);
   std::normal_distribution<double> normal;
   std::size_t inside = 0, all = 0;

@@ -35,7 +35,8 @@ constexpr std::array<SlopeTerm, 6> kTerms{{{"EXY", 2, -1.0},
 class SlopeIsSquareness : public testing::TestWithParam<std::tuple<SlopeTerm, Estimator>> {};
 INSTANTIATE_TEST_SUITE_P(OtfTerms, SlopeIsSquareness,
                          testing::Combine(testing::ValuesIn(kTerms),
-                                          testing::Values(Estimator::TwoStep, Estimator::Joint)));
+                                          testing::Values(Estimator::TwoStep,
+                                                          Estimator::Simultaneous)));
 
 /// A machine whose only error is a slope of one table.
 MadeRun run_with_slope(const std::string& name) {
@@ -56,7 +57,7 @@ TEST_P(SlopeIsSquareness, WithItsSign) {
   const auto& [term, estimator] = GetParam();
   MadeRun run = run_with_slope(term.table);
   run.options.estimator = estimator;
-  run.options.block_samples = 5;  // 16 mm
+  run.options.segment_samples = 5;  // 16 mm
   const auto found = identify(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(found) << found.error().text;
   const VolumetricModel& model = found->solution.model;
@@ -68,13 +69,14 @@ TEST_P(SlopeIsSquareness, WithItsSign) {
         << kSquarenessNames[k] << " of " << term.table;
   }
   EXPECT_LT(model.U().head(static_cast<Eigen::Index>(first)).cwiseAbs().maxCoeff(), 2e-9)
-      << "the tables have no slope of their own in gauge G1";
+      << "the tables have no slope of their own in datum G1";
 }
 
 class SquarenessAlone : public testing::TestWithParam<std::tuple<std::size_t, Estimator>> {};
 INSTANTIATE_TEST_SUITE_P(OtfTerms, SquarenessAlone,
                          testing::Combine(testing::Values(0u, 1u, 2u),
-                                          testing::Values(Estimator::TwoStep, Estimator::Joint)));
+                                          testing::Values(Estimator::TwoStep,
+                                                          Estimator::Simultaneous)));
 
 TEST_P(SquarenessAlone, IsRecovered) {
   const auto [which, estimator] = GetParam();
@@ -84,7 +86,7 @@ TEST_P(SquarenessAlone, IsRecovered) {
   run.truth(at) = kSlope;
   measure_run(run, made);
   run.options.estimator = estimator;
-  run.options.block_samples = 5;  // 16 mm
+  run.options.segment_samples = 5;  // 16 mm
   const auto found = identify(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(found) << found.error().text;
   Eigen::VectorXd rest = found->solution.model.U();

@@ -62,7 +62,7 @@ INSTANTIATE_TEST_SUITE_P(
                               r.q_m *= 1e-3;
                             }
                           }},
-                    Fault{"of the blocks only", ErrorCode::AlignmentFailed,
+                    Fault{"of the segments only", ErrorCode::AlignmentFailed,
                           [](EncoderLog& log) { log.readings.resize(log.readings.size() / 10); }},
                     Fault{"time must ascend", ErrorCode::BadInput,
                           [](EncoderLog& log) {
@@ -100,7 +100,7 @@ TEST(OtfReadings, WithAnOffsetOfHoursAreMatched) {
   EXPECT_NEAR(s.clock.offset_s, run.clock.offset_s + kLater_s, 4.0 * s.u_offset_s);
 }
 
-/// Blocks without readings keep their rows across the travel.
+/// Segments without readings keep their rows across the travel.
 TEST(OtfReadings, WithGapsGiveFewerRowsAndTheSameClock) {
   EncoderRun run = good_run();
   auto& readings = run.log.readings;
@@ -117,7 +117,7 @@ TEST(OtfReadings, WithGapsGiveFewerRowsAndTheSameClock) {
   ASSERT_TRUE(id->solution.synchronisation);
   const Synchronisation& s = *id->solution.synchronisation;
   EXPECT_LT(s.rows, whole->solution.synchronisation->rows * 9 / 10);
-  EXPECT_EQ(id->observations.blocks_used, whole->observations.blocks_used);
+  EXPECT_EQ(id->observations.segments_used, whole->observations.segments_used);
   EXPECT_NEAR(s.clock.offset_s, run.clock.offset_s, 4.0 * s.u_offset_s);
 }
 

@@ -19,7 +19,7 @@ using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 
-/// 10000 mm/min, blocks of 20 samples; mean error with and without scale readings, ref.json
+/// 10000 mm/min, segments of 20 samples; mean error with and without scale readings, ref.json
 /// cases.B: 0.2087 and 1.908 um.
 class CaseB : public testing::TestWithParam<Estimator> {
  protected:
@@ -44,7 +44,7 @@ class CaseB : public testing::TestWithParam<Estimator> {
   [[nodiscard]] Result<Identification> identified(const EncoderLog* log) const {
     Options options;
     options.estimator = GetParam();
-    options.block_samples = 20;
+    options.segment_samples = 20;
     options.corner_m = 0.02;
     options.encoders = log;
     Path path;
@@ -71,7 +71,7 @@ class CaseB : public testing::TestWithParam<Estimator> {
   std::vector<double> truth_;
 };
 INSTANTIATE_TEST_SUITE_P(OtfEstimators, CaseB,
-                         testing::Values(Estimator::TwoStep, Estimator::Joint));
+                         testing::Values(Estimator::TwoStep, Estimator::Simultaneous));
 
 TEST_P(CaseB, HasTheErrorAndTheClockOfThePrototype) {
   const auto id = identified(&log_);
@@ -79,9 +79,9 @@ TEST_P(CaseB, HasTheErrorAndTheClockOfThePrototype) {
   ASSERT_TRUE(id->solution.synchronisation) << id->observations.notes.back();
   const Synchronisation& s = *id->solution.synchronisation;
 
-  const double asked_m = GetParam() == Estimator::Joint ? 0.21e-6 : 0.25e-6;
+  const double asked_m = GetParam() == Estimator::Simultaneous ? 0.21e-6 : 0.25e-6;
   EXPECT_LE(grid_error_of(id->solution.model).mean_m, asked_m);
-  const double offset_s = s.clock.offset_s - s.clock.drift * s.clock.reference_s;
+  const double offset_s = s.clock.offset_s - s.clock.drift * s.clock.origin_s;
   EXPECT_NEAR(offset_s, 3.7e-3, 3.0 * s.u_offset_s);
   EXPECT_NEAR(s.clock.drift, 2e-5, 3.0 * s.u_drift);
   EXPECT_LT(s.u_offset_s, 2e-6);
@@ -113,7 +113,7 @@ const Result<Identification>& identified_with_readings(unsigned seed, Estimator 
 }
 
 TEST(SynchronisedEstimate, FindsTheClock) {
-  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Simultaneous}) {
     const EncoderRun run = encoder_run(1, estimator);
     const auto& id = identified_with_readings(1, estimator);
     ASSERT_TRUE(id) << id.error().text;
@@ -129,7 +129,7 @@ TEST(SynchronisedEstimate, FindsTheClock) {
 /// which are 0.1 um of travel in one reading.
 TEST(SynchronisedEstimate, TakesTimesSince1970) {
   constexpr double kSince1970_s = 1.7e9;
-  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Simultaneous}) {
     const EncoderRun run = encoder_run(1, estimator);
     const auto& wanted = identified_with_readings(1, estimator);
     ASSERT_TRUE(wanted) << wanted.error().text;
@@ -161,8 +161,8 @@ TEST(SynchronisedEstimate, StatesAnHonestUncertainty) {
   double of_tables = 0.0, of_clock = 0.0;
   constexpr unsigned kRuns = abbe::tests::repetitions(8u);
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
-    const EncoderRun run = encoder_run(seed, Estimator::Joint);
-    const auto& id = identified_with_readings(seed, Estimator::Joint);
+    const EncoderRun run = encoder_run(seed, Estimator::Simultaneous);
+    const auto& id = identified_with_readings(seed, Estimator::Simultaneous);
     ASSERT_TRUE(id) << id.error().text;
     ASSERT_TRUE(id->solution.synchronisation);
     const Synchronisation& s = *id->solution.synchronisation;
@@ -192,7 +192,7 @@ TEST(SynchronisedEstimate, DoesNotTakeCorrelatedNoiseForErrorsOfTheReadings) {
     sample.p_tracker_m += slow_m;
   }
 
-  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Simultaneous}) {
     run.run.options.estimator = estimator;
     const auto id = identify_with_readings(run);
     ASSERT_TRUE(id) << id.error().text;
@@ -202,8 +202,8 @@ TEST(SynchronisedEstimate, DoesNotTakeCorrelatedNoiseForErrorsOfTheReadings) {
 }
 
 TEST(SynchronisedEstimate, IsAcceptedByTheGate) {
-  const EncoderRun run = encoder_run(3, Estimator::Joint);
-  const auto& id = identified_with_readings(3, Estimator::Joint);
+  const EncoderRun run = encoder_run(3, Estimator::Simultaneous);
+  const auto& id = identified_with_readings(3, Estimator::Simultaneous);
   ASSERT_TRUE(id) << id.error().text;
   const auto verdict = judge(id->observations, id->solution, nullptr, {}, run.run.options);
   ASSERT_TRUE(verdict) << verdict.error().text;
@@ -222,8 +222,8 @@ TEST(SynchronisedEstimate, OfATriggerLineHasASmallerError) {
   for (unsigned seed = 1; seed <= abbe::tests::repetitions(4u); ++seed) {
     EncoderRun run = make_encoder_run(
         {.seed = seed, .sigma_time_s = 10e-6, .stated_sigma_time_s = 10e-6, .speed_m_s = 0.1});
-    run.run.options.estimator = Estimator::Joint;
-    run.run.options.block_samples = 40;
+    run.run.options.estimator = Estimator::Simultaneous;
+    run.run.options.segment_samples = 40;
     run.log.known_clock = run.clock;
     const MadeRun& r = run.run;
     const auto across = identify(r.samples, r.machine, r.path, r.noise, r.options);

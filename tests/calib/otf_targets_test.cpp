@@ -61,7 +61,7 @@ struct MadeTargets {
   Machine machine;
   Options options;
   Noise noise;
-  Eigen::VectorXd truth;  ///< gauge G1
+  Eigen::VectorXd truth;  ///< datum G1
   std::vector<std::vector<TrackerObservation>> samples;
   std::vector<TargetRun> runs;
 
@@ -88,13 +88,13 @@ MadeTargets make_targets(const MadeTargetsOptions& wanted) {
   MadeTargets made;
   made.machine = coarse_machine(wanted.chain);
   made.machine.interpolation = wanted.interpolation;
-  made.options.block_samples = 10;
+  made.options.segment_samples = 10;
   made.options.orientation.scales_agree = true;
   const TableBasis basis = made.basis();
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(basis.size() + 6));
   const auto n = static_cast<Eigen::Index>(basis.size());
   U.head(n) = random_tables(basis.layout(), wanted.error_scale_m, random);
-  made.truth = to_gauge(Gauge::G1, basis.layout(), kThreeRunTargets, U)->head(n);
+  made.truth = to_datum(ModelDatum::G1, basis.layout(), kThreeRunTargets, U)->head(n);
 
   const double slower = wanted.nests ? 10.0 : 1.0;
   const double samples_per_second = 250.0 / slower, speed_m_s = 0.4 / slower;
@@ -130,7 +130,7 @@ Result<TargetsIdentification> identified_targets(const MadeTargets& made) {
 /// Exact samples.
 MadeTargets exact_targets(const std::string& chain) {
   MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6, .chain = chain});
-  made.options.estimator = Estimator::Joint;
+  made.options.estimator = Estimator::Simultaneous;
   return made;
 }
 
@@ -158,7 +158,7 @@ TEST(SeveralTargets, DetermineAll18TablesFromExactSamples) {
     const auto& found = identified_exactly(chain);
     ASSERT_TRUE(found) << found.error().text;
     EXPECT_EQ(found->statistics.unknowns - found->statistics.rank, 24u);
-    EXPECT_EQ(found->statistics.gauge_conditions, 24u);
+    EXPECT_EQ(found->statistics.datum_conditions, 24u);
     EXPECT_LT((found->model().U() - made.truth).cwiseAbs().maxCoeff(), 1e-9);
   }
 }
@@ -177,11 +177,11 @@ TEST(SeveralTargets, GiveAModelForAToolThatWasNotMeasured) {
 TEST(SeveralTargets, AreJoinedWithCubicTablesToo) {
   MadeTargets made = make_targets(
       {.noise_factor = 0.0, .error_scale_m = 30e-6, .interpolation = Interpolation::NaturalCubic});
-  made.options.estimator = Estimator::Joint;
+  made.options.estimator = Estimator::Simultaneous;
   const auto found = identified_targets(made);
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_EQ(found->model().interpolation(), Interpolation::NaturalCubic);
-  // The gauge of the truth is that of linear tables: V differs by a rigid motion.
+  // The datum of the truth is that of linear tables: V differs by a rigid motion.
   const Vector3 other(-0.2, 0.3, 0.1);
   std::vector<Vector3> points, left;
   for (const Vector3& q : tensor_grid(found->model().nodes())) {
@@ -203,7 +203,7 @@ struct ChiSquareOfErrors {
         scale.asDiagonal() * model.covariance() * scale.asDiagonal());
     const Eigen::VectorXd along =
         eigen.eigenvectors().transpose() * scale.asDiagonal() * (model.U() - truth);
-    constexpr double kFixed = 1e-9;  // relative variance of a combination that the gauge fixes
+    constexpr double kFixed = 1e-9;  // relative variance of a combination that the datum fixes
     for (Eigen::Index i = 0; i < along.size(); ++i) {
       if (const double variance = eigen.eigenvalues()(i); variance > kFixed) {
         squares += along(i) * along(i) / variance;

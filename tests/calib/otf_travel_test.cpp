@@ -75,7 +75,7 @@ TEST_P(TravelOfARun, GivesVInEveryDirectionWithinItsUncertainty) {
   constexpr unsigned kSeeds = 6;
   double known = 0.0, unknown = 0.0;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
-    const MadeRunOptions wanted{.seed = seed, .noise_seed = seed, .in_gauge = true};
+    const MadeRunOptions wanted{.seed = seed, .noise_seed = seed, .in_datum = true};
     MadeRun run = make_run(wanted);
     const BacklashOfRun truth = truth_of(run, seed);
     run = make_backlash_run(wanted, truth);

@@ -36,13 +36,13 @@ RunOfRows run_of_rows(const MadeRun& run) {
   const Adjustment a = *adjust(rows, o);
   const auto n = static_cast<Eigen::Index>(o.basis.size());
   VolumetricModel model = *VolumetricModel::from_vector(
-      o.layout(), Gauge::G1, std::array{o.target_offset_m}, a.U.head(n),
+      o.layout(), ModelDatum::G1, std::array{o.target_offset_m}, a.U.head(n),
       a.covariance.topLeftCorner(n, n), *ValidityVolume::hull_of(o.covered_m));
   return {std::move(o), std::move(rows), std::move(model)};
 }
 
 /// Both runs in one adjustment, each with rigid unknowns of its own.
-estimation::DatumSolution joint_adjustment(const RunOfRows& a, const RunOfRows& b) {
+estimation::DatumSolution adjustment_of_both(const RunOfRows& a, const RunOfRows& b) {
   const std::size_t model = a.observations.basis.size(), one = a.observations.unknowns();
   const std::size_t both = one + kRigidUnknowns;
   std::vector<std::size_t> at_a(one), at_b(one);
@@ -53,20 +53,20 @@ estimation::DatumSolution joint_adjustment(const RunOfRows& a, const RunOfRows& 
   estimation::Information sum(both);
   sum.add(a.rows.data, at_a);
   sum.add(b.rows.data, at_b);
-  const estimation::Datum datum(gauge_conditions(Gauge::G1, a.observations.basis, both));
+  const estimation::Datum datum(datum_conditions(ModelDatum::G1, a.observations.basis, both));
   return *datum.solve(sum);
 }
 
-TEST(ModelUpdate, WithoutProcessNoiseIsTheJointAdjustmentOfBothRuns) {
+TEST(ModelUpdate, WithoutProcessNoiseIsTheAdjustmentOfBothRuns) {
   MadeRun second = make_run({.noise_seed = 2, .rate_hz = 500.0});
   const RunOfRows a = run_of_rows(make_run({.noise_seed = 1})), b = run_of_rows(second);
-  const estimation::DatumSolution joint = joint_adjustment(a, b);
+  const estimation::DatumSolution both = adjustment_of_both(a, b);
   const VolumetricModel updated = *update_model(a.model, b.model);
   const Eigen::Index n = updated.U().size();
   const Eigen::VectorXd u = updated.covariance().diagonal().cwiseSqrt();
 
-  EXPECT_LT((updated.U() - joint.U.head(n)).cwiseAbs().maxCoeff(), 1e-6 * u.maxCoeff());
-  EXPECT_LT((updated.covariance() - joint.covariance.topLeftCorner(n, n)).cwiseAbs().maxCoeff(),
+  EXPECT_LT((updated.U() - both.U.head(n)).cwiseAbs().maxCoeff(), 1e-6 * u.maxCoeff());
+  EXPECT_LT((updated.covariance() - both.covariance.topLeftCorner(n, n)).cwiseAbs().maxCoeff(),
             1e-9 * u.maxCoeff() * u.maxCoeff());
 }
 
@@ -85,7 +85,7 @@ TEST(ModelUpdate, IsNeverLessCertainThanTheRunAlone) {
   }
 }
 
-TEST(ModelUpdate, MeetsTheGaugeExactly) {
+TEST(ModelUpdate, MeetsTheDatumExactly) {
   RepeatedRuns runs(2);
   const VolumetricModel updated = *update_model(runs.run(), runs.run());
   for (const Parameter& p : updated.parameters()) {

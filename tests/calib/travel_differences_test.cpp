@@ -21,11 +21,11 @@ using testing::HasSubstr;
 constexpr auto kBack = Travel::Backward, kRest = Travel::Unknown, kForth = Travel::Forward;
 const Vector3 kTravelTool(0.02, -0.015, -0.12), kTravelPlace(0.13, -0.11, -0.27);
 
-/// A model with differences of some um, and the joint covariance of its tables and differences.
+/// A model with differences of some um, and the covariance of its tables and differences.
 struct WithTravel {
   VolumetricModel model;
   TableBasis basis;
-  Eigen::MatrixXd joint;
+  Eigen::MatrixXd whole;
 };
 
 WithTravel model_with_travel(TravelDependence kind, Interpolation interpolation) {
@@ -47,15 +47,15 @@ WithTravel model_with_travel(TravelDependence kind, Interpolation interpolation)
     value = 5e-6 * normal(random);
   }
 
-  const Eigen::MatrixXd joint = root * root.transpose();
+  const Eigen::MatrixXd whole = root * root.transpose();
   const Eigen::MatrixXd half = half_differences(basis, U.tail(all - n));
   const auto mean = VolumetricModel::from_vector(
-      layout, Gauge::G1, std::array{kTravelTool}, U.head(n),
-      joint.topLeftCorner(n, n) + half * half.transpose(),
+      layout, ModelDatum::G1, std::array{kTravelTool}, U.head(n),
+      whole.topLeftCorner(n, n) + half * half.transpose(),
       *ValidityVolume::hull_of(tensor_grid(layout.nodes())), interpolation);
-  return {*mean->with_travel({kind, U.tail(all - n), joint.bottomRightCorner(all - n, all - n),
-                              joint.topRightCorner(n, all - n)}),
-          basis, joint};
+  return {*mean->with_travel({kind, U.tail(all - n), whole.bottomRightCorner(all - n, all - n),
+                              whole.topRightCorner(n, all - n)}),
+          basis, whole};
 }
 
 /// All columns at a state, dense.
@@ -87,14 +87,14 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Combine(testing::Values(TravelDependence::Backlash, TravelDependence::Tables),
                      testing::Values(Interpolation::Linear, Interpolation::NaturalCubic)));
 
-TEST_P(DirectionOfTravel, OfAllAxesGivesVOfTheJointParameters) {
+TEST_P(DirectionOfTravel, OfAllAxesGivesVOfAllParameters) {
   const Eigen::VectorXd U = all_values(made_.model);
   for (const AxisTravel travel : {AxisTravel{kForth, kForth, kForth}, {kBack, kForth, kBack}}) {
     const Eigen::Matrix3Xd J = dense_columns(made_.basis, travel);
     const VolumetricError e = made_.model.error_at(kTravelPlace, kTravelTool, travel);
     EXPECT_LT((e.V_m - J * U).norm(), 1e-17);
     EXPECT_LT((made_.model.V_at(kTravelPlace, kTravelTool, travel) - J * U).norm(), 1e-17);
-    EXPECT_TRUE(e.cov_V_m2.isApprox(J * made_.joint * J.transpose(), 1e-9));
+    EXPECT_TRUE(e.cov_V_m2.isApprox(J * made_.whole * J.transpose(), 1e-9));
   }
 }
 

@@ -83,7 +83,7 @@ VolumetricModel reference_model(const std::string& solution) {
   const Eigen::VectorXd c = (1000.0 * design.named_from_scaled()).fullPivLu().solve(named);
   const auto n = static_cast<Eigen::Index>(design.size());
   return *VolumetricModel::from_polynomials(
-      *PolynomialModel::of(design, balls[0], c, Eigen::MatrixXd::Zero(n, n)), Gauge::Ball1,
+      *PolynomialModel::of(design, balls[0], c, Eigen::MatrixXd::Zero(n, n)), ModelDatum::Ball1,
       Vector3::Zero(), *ValidityVolume::hull_of(balls));
 }
 
@@ -143,8 +143,8 @@ VolumetricModel scaled_tables(double factor) {
     U(i) = factor * 50e-6 * std::sin(2.0 * static_cast<double>(i));
   const auto hull = box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {2, 2, 2});
   const std::vector<Vector3> tools{Vector3::Zero()};
-  return *VolumetricModel::from_vector(layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
-                                       *ValidityVolume::hull_of(hull));
+  return *VolumetricModel::from_vector(layout, ModelDatum::G1, tools, U,
+                                       Eigen::MatrixXd::Zero(n, n), *ValidityVolume::hull_of(hull));
 }
 
 // Nodes every 50 mm, points every 200 mm: between the nodes the tables change by tens of um; the
@@ -294,8 +294,9 @@ TEST(Verification, TakesModelsOfTables) {
   const auto n = U.size();
   const auto hull = box_of({0, 0, 0}, {0.3, 0.3, 0.1}, {2, 2, 2});
   const std::vector<Vector3> tools{Vector3::Zero()};
-  const auto model = *VolumetricModel::from_vector(
-      layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n), *ValidityVolume::hull_of(hull));
+  const auto model =
+      *VolumetricModel::from_vector(layout, ModelDatum::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
+                                    *ValidityVolume::hull_of(hull));
   const auto c = verified(field_of(model), model, box_of({0, 0, 0}, {0.3, 0.3, 0.1}, {7, 7, 5}),
                           Frame::BestFit);
 

@@ -39,8 +39,8 @@ ValidityVolume whole_volume(const ParameterLayout& layout) {
 }
 
 VolumetricModel model_of(const Made& m) {
-  return *VolumetricModel::from_vector(m.layout, Gauge::G1, std::array{kTool}, m.U, m.covariance,
-                                       whole_volume(m.layout));
+  return *VolumetricModel::from_vector(m.layout, ModelDatum::G1, std::array{kTool}, m.U,
+                                       m.covariance, whole_volume(m.layout));
 }
 
 TEST(VolumetricModel, PropagatesItsFullCovariance) {
@@ -77,7 +77,7 @@ TEST(VolumetricModel, Of18TablesHoldsForAnyTool) {
   std::mt19937_64 random(2);
   const Eigen::VectorXd U = random_tables(layout, 1e-4, random);
   const std::vector<Vector3> tools{{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}};
-  const auto model = VolumetricModel::from_vector(layout, Gauge::G1, tools, U,
+  const auto model = VolumetricModel::from_vector(layout, ModelDatum::G1, tools, U,
                                                   Eigen::MatrixXd::Identity(U.size(), U.size()),
                                                   whole_volume(layout));
 
@@ -93,7 +93,7 @@ VolumetricModel of_18_tables(const std::vector<Vector3>& tools) {
   const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);
   std::mt19937_64 random(2);
   const Eigen::VectorXd U = random_tables(layout, 1e-4, random);
-  return *VolumetricModel::from_vector(layout, Gauge::G1, tools, U,
+  return *VolumetricModel::from_vector(layout, ModelDatum::G1, tools, U,
                                        Eigen::MatrixXd::Identity(U.size(), U.size()),
                                        whole_volume(layout));
 }
@@ -226,8 +226,8 @@ TEST(VolumetricModel, OfPolynomialsHasNodesOverItsVolumeAndNoTables) {
   const auto polynomials =
       PolynomialModel::of(*design, Vector3::Zero(), Eigen::VectorXd::Constant(n, 1e-5),
                           Eigen::MatrixXd::Identity(n, n) * 1e-12);
-  const auto model =
-      VolumetricModel::from_polynomials(*polynomials, Gauge::Ball1, kTool, whole_volume(m.layout));
+  const auto model = VolumetricModel::from_polynomials(*polynomials, ModelDatum::Ball1, kTool,
+                                                       whole_volume(m.layout));
   ASSERT_TRUE(model) << model.error().text;
   EXPECT_EQ(model->tables(), nullptr);
   EXPECT_NEAR(model->nodes()[0].nodes_m.front(), m.layout.nodes()[0].nodes_m.front(), 1e-9);
@@ -235,12 +235,12 @@ TEST(VolumetricModel, OfPolynomialsHasNodesOverItsVolumeAndNoTables) {
   EXPECT_FALSE(model->linear_between_nodes());
 }
 
-TEST(RigidFreeDifference, IsZeroBetweenTwoGaugesOfOneMachine) {
+TEST(RigidFreeDifference, IsZeroBetweenTwoDatumsOfOneMachine) {
   const Made m = random_model(1e-4);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(m.layout.fit_size()));
   U.head(m.U.size()) = m.U;
   Made other = m;
-  other.U = to_gauge(Gauge::G1, m.layout, std::array{kTool}, U)->head(m.U.size());
+  other.U = to_datum(ModelDatum::G1, m.layout, std::array{kTool}, U)->head(m.U.size());
   const auto difference =
       rigid_free_difference(model_of(m), model_of(other), kTool, tensor_grid(m.layout.nodes()));
   ASSERT_TRUE(difference);

@@ -196,7 +196,7 @@ TEST(CounterCardOutage, AHostDelayedWhileTheStatusIsAwaitedReadsTheAnswerFirst) 
   EXPECT_EQ(bench.device->status().gaps, 0u);
 }
 
-TEST(CounterCardOutage, AHostDelayedUntilTheCardOverranKeepsTheDatum) {
+TEST(CounterCardOutage, AHostDelayedUntilTheCardOverranKeepsTheZero) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);

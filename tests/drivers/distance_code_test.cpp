@@ -14,12 +14,12 @@
 namespace abbe::tests {
 namespace {
 
-using drivers::datum_of;
 using drivers::DistanceCode;
 using drivers::first_mark;
 using drivers::MarkFault;
 using drivers::MarkTraverse;
 using drivers::MarkTraverseOptions;
+using drivers::zero_of;
 
 using Four = std::array<double, 4>;
 
@@ -60,9 +60,9 @@ TEST(DistanceCode, FindsEveryFourMarksOfEveryScale) {
     for_every_four(code, [&](Four four) {
       const double truth = four[0];
       for (double& mark : four) mark -= 12'345.0;  // the counter's zero is anywhere
-      const auto datum = datum_of(code, four);
-      ASSERT_TRUE(datum) << code.increment << " at " << truth;
-      const double error = datum->offset_periods - 12'345.0;
+      const auto zero = zero_of(code, four);
+      ASSERT_TRUE(zero) << code.increment << " at " << truth;
+      const double error = zero->offset_periods - 12'345.0;
       const auto length = static_cast<double>(code.length);
       EXPECT_NEAR(code.rotary ? error - length * std::round(error / length) : error, 0.0, 1e-9);
     });
@@ -78,7 +78,7 @@ TEST(DistanceCode, RefusesEveryOnePeriodErrorAtAnyOfFourMarks) {
           Four wrong = four;
           wrong[mark] += error;
           ++tried;
-          EXPECT_FALSE(datum_of(code, wrong))
+          EXPECT_FALSE(zero_of(code, wrong))
               << code.increment << " at " << four[0] << ", mark " << mark;
         }
       }
@@ -95,7 +95,7 @@ TEST(DistanceCode, RefusesEverySlipOfOnePeriodBetweenMarks) {
         for (const double error : {-1.0, 1.0}) {
           Four wrong = four;
           for (std::size_t mark = from; mark < 4; ++mark) wrong[mark] += error;
-          EXPECT_FALSE(datum_of(code, wrong))
+          EXPECT_FALSE(zero_of(code, wrong))
               << code.increment << " at " << four[0] << ", from " << from;
         }
       }
@@ -111,7 +111,7 @@ TEST(DistanceCode, RefusesMarksWithOneMissing) {
         Four four{};
         for (std::size_t j = 0; j < 4; ++j)
           four[j] = static_cast<double>(marks[i + j + (j >= missing ? 1 : 0)]);
-        EXPECT_FALSE(datum_of(code, four)) << code.increment << " at " << four[0];
+        EXPECT_FALSE(zero_of(code, four)) << code.increment << " at " << four[0];
       }
     }
   }
@@ -122,7 +122,7 @@ TEST(DistanceCode, RefusesEveryOtherScale) {
     for (const DistanceCode& actual : kCodes) {
       if (actual.increment == configured.increment) continue;
       for_every_four(actual, [&](const Four& four) {
-        EXPECT_FALSE(datum_of(configured, four))
+        EXPECT_FALSE(zero_of(configured, four))
             << configured.increment << " for " << actual.increment;
       });
     }
@@ -135,20 +135,20 @@ TEST(DistanceCode, RefusesAWrongSignalPeriodAndAScaleTheOtherWayRound) {
     for (const double factor : {0.2, 0.5, 2.0, 5.0, -1.0}) {
       Four wrong = four;
       for (double& mark : wrong) mark *= factor;
-      EXPECT_FALSE(datum_of(code, wrong)) << factor << " at " << four[0];
+      EXPECT_FALSE(zero_of(code, wrong)) << factor << " at " << four[0];
     }
   });
 }
 
 TEST(DistanceCode, RefusesDistancesBetweenPeriods) {
   const DistanceCode code{.increment = 1000, .length = 100'000};
-  EXPECT_EQ(datum_of(code, Four{0.0, 501.3, 1000.0, 1502.0}).error(), MarkFault::NotWhole);
-  EXPECT_TRUE(datum_of(code, Four{0.0, 501.1, 1000.0, 1502.0}));
+  EXPECT_EQ(zero_of(code, Four{0.0, 501.3, 1000.0, 1502.0}).error(), MarkFault::NotWhole);
+  EXPECT_TRUE(zero_of(code, Four{0.0, 501.1, 1000.0, 1502.0}));
 }
 
 TEST(DistanceCode, RefusesADirectionThatChanges) {
   const DistanceCode code{.increment = 1000, .length = 100'000};
-  EXPECT_EQ(datum_of(code, Four{0.0, 501.0, 0.0, 501.0}).error(), MarkFault::Reversed);
+  EXPECT_EQ(zero_of(code, Four{0.0, 501.0, 0.0, 501.0}).error(), MarkFault::Reversed);
 }
 
 TEST(DistanceCode, ChecksItsConfiguration) {
@@ -160,7 +160,7 @@ TEST(DistanceCode, ChecksItsConfiguration) {
 }
 
 /// An axis that is driven back and forth over its scale, its marks read with noise. Its faults are
-/// drawn at random; the datum found at the end is compared with the true one.
+/// drawn at random; the zero found at the end is compared with the true one.
 class Traverse {
  public:
   Traverse(const DistanceCode& code, std::mt19937& random)
@@ -171,8 +171,8 @@ class Traverse {
     direction_ = random_() % 2 == 0 ? 1 : -1;
   }
 
-  /// True if a datum was given and is wrong.
-  bool gives_a_wrong_datum() {
+  /// True if a zero was given and is wrong.
+  bool gives_a_wrong_zero() {
     MarkTraverse traverse{options_};
     for (int crossed = 0; crossed < 14; ++crossed) {
       if (chance(0.08)) turn_round(traverse);
@@ -230,13 +230,13 @@ class Traverse {
   bool wrong_ = false;
 };
 
-TEST(MarkTraverseFigure, NoWrongDatumInAHundredThousandTraverses) {
+TEST(MarkTraverseFigure, NoWrongZeroInAHundredThousandTraverses) {
   std::mt19937 random(4711);
   int wrong = 0;
   int found = 0;
   for (int i = 0; i < 100'000; ++i) {
     Traverse traverse{kCodes[static_cast<std::size_t>(i) % kCodes.size()], random};
-    wrong += traverse.gives_a_wrong_datum() ? 1 : 0;
+    wrong += traverse.gives_a_wrong_zero() ? 1 : 0;
     found += traverse.found() ? 1 : 0;
   }
   EXPECT_EQ(wrong, 0);
@@ -253,9 +253,9 @@ TEST(MarkTraverse, NeedsFourMarksOfOneDirection) {
   EXPECT_FALSE(traverse.on_mark(2000));
   EXPECT_FALSE(traverse.on_mark(2503));
   EXPECT_FALSE(traverse.on_mark(3000));
-  const auto datum = traverse.on_mark(3504);
-  ASSERT_TRUE(datum && *datum);
-  EXPECT_EQ((*datum)->offset_periods, 0.0);
+  const auto zero = traverse.on_mark(3504);
+  ASSERT_TRUE(zero && *zero);
+  EXPECT_EQ((*zero)->offset_periods, 0.0);
 }
 
 TEST(MarkTraverse, RestartsAfterAReversalBetweenTwoMarks) {
@@ -275,7 +275,7 @@ TEST(MarkTraverse, DetectsAScaleThatCountsBackwards) {
   MarkTraverseOptions options = one_count_per_period();
   options.counts_per_period = -4.0;
   MarkTraverse traverse{options};
-  std::optional<tl::expected<drivers::MarkDatum, MarkFault>> outcome;
+  std::optional<tl::expected<drivers::MarkZero, MarkFault>> outcome;
   for (const std::int64_t mark : {2000, 2503, 3000, 3504})
     outcome = traverse.on_mark(-4 * mark + 40);
   ASSERT_TRUE(outcome && *outcome);

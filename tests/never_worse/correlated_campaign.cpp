@@ -20,7 +20,7 @@
 
 #include "abbe/calib/model/model_drift.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "figure.hpp"
 #include "otf_run.hpp"
@@ -46,7 +46,7 @@ std::string noise_text(double correlation_s) {
 calib::Result<calib::otf::Identification> identified(OtfRun& run) {
   const auto samples = measure(run);
   calib::otf::Options options;
-  options.block_samples = calib::otf::suitable_block_samples(samples);
+  options.segment_samples = calib::otf::suitable_segment_samples(samples);
   options.orientation = run.evidence;
   return calib::otf::identify(samples, run.machine, {run.path_m}, run.noise, options);
 }
@@ -71,7 +71,7 @@ struct Coverage {
   std::size_t inside = 0, all = 0;
 
   void count(const calib::VolumetricError& e, const Vector3& true_V_m) {
-    constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;  // fixed by the gauge below it
+    constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;  // fixed by the datum below it
     for (Eigen::Index k = 0; k < 3; ++k) {
       const double u_m = std::sqrt(std::max(0.0, e.cov_V_m2(k, k)));
       if (u_m > kFixed_m) {

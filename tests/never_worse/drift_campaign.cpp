@@ -15,7 +15,7 @@
 
 #include "abbe/calib/model/model_drift.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "figure.hpp"
 #include "otf_run.hpp"
 #include "random_numbers.hpp"
@@ -34,7 +34,7 @@ OtfRun short_run(std::uint64_t seed) {
 
 calib::Result<calib::otf::Identification> identified(OtfRun& run, calib::otf::Options& options) {
   const auto samples = measure(run);
-  options.block_samples = calib::otf::suitable_block_samples(samples);
+  options.segment_samples = calib::otf::suitable_segment_samples(samples);
   options.orientation = run.evidence;
   return calib::otf::identify(samples, run.machine, {run.path_m}, run.noise, options);
 }

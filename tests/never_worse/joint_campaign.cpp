@@ -92,7 +92,7 @@ bool measure_wrong_lengths(int machines, unsigned first_seed, const calib::mfb::
 /// Squared error of the joint model over its covariance, per combination that is determined.
 double normalised_square(const TripleMachine& m, const Triple& t,
                          const calib::VolumetricModel& model) {
-  // The truth with the rotations of the common tables only: for their tool, and in gauge G1.
+  // The truth with the rotations of the common tables only: for their tool, and in datum G1.
   const auto &all = m.all.layout(), &layout = t.common.basis.layout();
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   U.segment<3>(static_cast<Eigen::Index>(layout.squareness_offset())) = m.truth.tail<3>();
@@ -112,7 +112,7 @@ double normalised_square(const TripleMachine& m, const Triple& t,
     }
   }
   const Eigen::VectorXd truth =
-      calib::to_gauge(calib::Gauge::G1, layout, std::array{t.common.tool_offset_m}, U)
+      calib::to_datum(calib::ModelDatum::G1, layout, std::array{t.common.tool_offset_m}, U)
           ->head(model.U().size());
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(model.covariance());
   const double least = 1e-9 * eigen.eigenvalues().maxCoeff();

@@ -421,7 +421,7 @@ Outcome identify_and_compare_mfb(MfbRun run) {
     }
     return V;
   };
-  // Gauge G2: V is 0 at the reference of the axes, which is 0 for this machine.
+  // Datum G2: V is 0 at the reference of the axes, which is 0 for this machine.
   const Vector3 at_reference_m = true_V_m(Vector3::Zero());
   compare_with_truth(outcome, found->model, box, stated_m,
                      [&](const Vector3& q) { return Vector3(true_V_m(q) - at_reference_m); });

@@ -17,7 +17,7 @@ struct Box {
 };
 
 /// Sets the figures of `outcome` but those of U(V), from a grid of 9 x 9 x 9 readings. Intervals
-/// are those of V as the gauge of the model states it: `true_V_m` is in this gauge.
+/// are those of V as the datum of the model states it: `true_V_m` is in this datum.
 inline void compare_with_truth(
     Outcome& outcome, const calib::VolumetricModel& model, const Box& box,
     const calib::Vector3& tool_offset_m,
@@ -45,7 +45,7 @@ inline void compare_with_truth(
              left = calib::rigid_free(points, difference);
   outcome.before_m = before->rigid_free.mean_m;
   outcome.left_m = left->rigid_free.mean_m;
-  // A component of V whose uncertainty is below kFixed_m is fixed by the gauge and has no interval.
+  // A component of V whose uncertainty is below kFixed_m is fixed by the datum and has no interval.
   constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (Eigen::Index k = 0; k < 3; ++k) {

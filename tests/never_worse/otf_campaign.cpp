@@ -1,7 +1,7 @@
 // Random machines with typical faults of a shop floor, on-the-fly method. Prints for every fault
 // how many models were accepted, how many of these make the machine worse, how many are wrong by
 // more than three times their stated uncertainty, and how often the fault is the cause named first.
-// ABBE_NEVER_WORSE_ESTIMATOR=two-step or joint: instead of the default estimator.
+// ABBE_NEVER_WORSE_ESTIMATOR=two-step or simultaneous: instead of the default estimator.
 #include <cstdlib>
 
 #include "campaign.hpp"

@@ -6,7 +6,7 @@
 
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/calib/otf/identify/identify.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "model_against_truth.hpp"
@@ -46,8 +46,8 @@ void make_machine(OtfRun& run, double spacing_m) {
   for (const sim::Axis a : sim::kAxes) {
     const auto& range = run.truth.axis(a).range;
     auto nodes = calib::equidistant_nodes(range.min_m, range.max_m, spacing_m);
-    // The true errors are zero at this position, as gauge G1 requires; so the intervals of the
-    // model, which is in gauge G1, can be compared with the truth.
+    // The true errors are zero at this position, as datum G1 requires; so the intervals of the
+    // model, which is in datum G1, can be compared with the truth.
     nodes->reference_m = range.reference_m;
     run.machine.nodes[static_cast<std::size_t>(a)] = *std::move(nodes);
   }
@@ -80,7 +80,7 @@ Vector3 with_noise(const Vector3& p, const Vector3& noise, double range_m, doubl
   return p + range_m * noise.x() * er + angle_rad * p.norm() * (noise.y() * e1 + noise.z() * e2);
 }
 
-/// V at the reference position due to squareness alone, which gauge G2 sets to zero.
+/// V at the reference position due to squareness alone, which datum G2 sets to zero.
 Vector3 of_squareness_at_reference(const sim::TruthMachine& truth) {
   const double y_m = truth.axes[1].range.reference_m, z_m = truth.axes[2].range.reference_m;
   const sim::Squareness& s = truth.squareness;
@@ -450,7 +450,7 @@ Outcome identify_and_compare(OtfRun run) {
 
   calib::otf::Options options;
   options.estimator = run.estimator;
-  options.block_samples = calib::otf::suitable_block_samples(samples);
+  options.segment_samples = calib::otf::suitable_segment_samples(samples);
   options.orientation = run.evidence;
   options.mode = run.mode;
   options.standstill.u_repeatability_m = run.u_repeatability_m;

@@ -79,7 +79,7 @@ TruthMachine bar_machine(std::uint64_t seed = 1) {
                                 .shape = Shape::Cubic});
 }
 
-TEST(MfbMachine, IsInTheGaugeOfTheMethod) {
+TEST(MfbMachine, IsInTheDatumOfTheMethod) {
   const TruthMachine machine = bar_machine(3);
   EXPECT_NEAR(mean_error_m(machine), 40e-6, 0.1e-6);
   for (const Axis axis : kAxes) {

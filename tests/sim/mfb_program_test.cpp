@@ -61,7 +61,7 @@ TEST_F(MfbProgram, WritesTheFilesOfACalibration) {
   EXPECT_THAT(text("made/run/machine.toml"), HasSubstr("basis = \"cubic\""));
   EXPECT_THAT(text("made/run/verification.csv"), HasSubstr("tracker_x_mm"));
 
-  const Outcome truth = run("truth --config made/run/sim.toml --tool=0,0,-150 --grid 2 2 2");
+  const Outcome truth = run("truth --config made/run/sim.toml --tool-mm=0,0,-150 --grid 2 2 2");
   EXPECT_EQ(truth.code, 0) << truth.output;
   EXPECT_NE(truth.output, run("truth --config made/run/sim.toml --grid 2 2 2").output);
 }
@@ -92,9 +92,9 @@ TEST_F(MfbProgram, WrongOptionsAreUsageErrors) {
       {"mfb -o out --tip-radius-mm 9", "tip radius"},
       {"mfb -o out --holes 5", "--holes"},
       {"mfb -o out --u-bar-um 0.2,0.3", "--u-bar-um"},
-      {"mfb -o out --outlier X1,hole,3,,2", "NAME=VALUE"},
-      {"mfb -o out --outlier X1,hole,3,,2=much", "much"},
-      {"mfb -o out --outlier X1,hole,13,,2=50", "X1,hole,13,,2"},
+      {"mfb -o out --outlier-um X1,hole,3,,2", "NAME=VALUE"},
+      {"mfb -o out --outlier-um X1,hole,3,,2=much", "much"},
+      {"mfb -o out --outlier-um X1,hole,13,,2=50", "X1,hole,13,,2"},
       {"mfb -o out --miss X1,hole,3,2", "X1,hole,3,2"},
       {"mfb -o out --turned X9=z", "X9"},
       {"mfb -o out --turned X1=w", "x, y or z"},

@@ -39,8 +39,9 @@ class RepeatedRuns {
   [[nodiscard]] calib::VolumetricModel run() { return run(no_change()); }
   [[nodiscard]] calib::VolumetricModel with(const Eigen::VectorXd& U,
                                             const Eigen::MatrixXd& covariance) const {
-    return *calib::VolumetricModel::from_vector(
-        layout(), calib::Gauge::G1, model_->tool_offsets_m(), U, covariance, model_->validity());
+    return *calib::VolumetricModel::from_vector(layout(), calib::ModelDatum::G1,
+                                                model_->tool_offsets_m(), U, covariance,
+                                                model_->validity());
   }
 
   [[nodiscard]] Eigen::VectorXd no_change() const {

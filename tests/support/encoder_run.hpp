@@ -22,13 +22,13 @@ struct EncoderRunOptions {
   double speed_m_s = 0.4;
 };
 
-/// As make_run(), with tables of 10 um in gauge G1.
+/// As make_run(), with tables of 10 um in datum G1.
 inline EncoderRun make_encoder_run(const EncoderRunOptions& wanted) {
   EncoderRun made;
   made.run = make_run({.seed = wanted.seed,
                        .noise_seed = wanted.seed,
                        .error_scale_m = 10e-6,
-                       .in_gauge = true,
+                       .in_datum = true,
                        .speed_m_s = wanted.speed_m_s});
   made.clock = wanted.clock;
   made.log.sigma_time_s = wanted.stated_sigma_time_s;

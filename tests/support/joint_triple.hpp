@@ -49,7 +49,7 @@ inline TripleMachine triple_machine(unsigned seed) {
   const auto nodes = *calib::equidistant_nodes(0.0, kTripleTravel_m, kTripleNodes_m);
   run.machine.nodes = {nodes, nodes, nodes};
   run.path = scaled_path();
-  run.options.block_samples = 10;
+  run.options.segment_samples = 10;
   run.options.orientation.scales_agree = true;
   run.T_machine_tracker = otf::case_a_alignment(true);
 

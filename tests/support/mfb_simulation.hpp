@@ -1,7 +1,7 @@
 #pragma once
 /// A machine with 21 known errors that probes a Multi-Feature Bar, for tests: exact transforms of
 /// [Viprey 2016] eq. 8 with exact rotations, written independently of the error model of calib. The
-/// errors are smooth functions in gauge G1.
+/// errors are smooth functions in datum G1.
 
 #include <algorithm>
 #include <array>

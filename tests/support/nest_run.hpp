@@ -135,7 +135,7 @@ inline MadeRun make_nest_run(const NestRunOptions& wanted) {
   MadeRun run = make_run({.seed = wanted.seed,
                           .noise_seed = wanted.seed,
                           .error_scale_m = 10e-6,
-                          .in_gauge = true,
+                          .in_datum = true,
                           .speed_m_s = 0.04,
                           .rate_hz = 25.0});
   run.samples = with_drift_and_visits(run.samples, wanted, run.noise, run.T_machine_tracker);

@@ -74,9 +74,9 @@ enum class TableColumn {
   Node,
   Truth,
   NoiseFreeTwoStep,
-  NoiseFreeJoint,
+  NoiseFreeSimultaneous,
   NoisyTwoStep,
-  NoisyJoint,
+  NoisySimultaneous,
   Sigma,
   OneShot,
   SigmaOneShot
@@ -125,8 +125,8 @@ inline calib::RigidTransform case_a_alignment(bool noisy) {
 
   return T;
 }
-/// The same of the joint estimate (joint_R, joint_T).
-inline calib::RigidTransform case_a_joint_alignment(bool noisy) {
+/// The same of the simultaneous estimate (joint_R, joint_T).
+inline calib::RigidTransform case_a_simultaneous_alignment(bool noisy) {
   calib::RigidTransform T;
   if (noisy) {
     T.R << 0.4532502113176768, -0.8912675538647216, -0.014366397198909378, 0.8907257279198967,
@@ -151,19 +151,19 @@ inline calib::RigidTransform case_a_rough_alignment_noisy() {
   return T;
 }
 
-struct ReferenceBlocks {
+struct ReferenceSegments {
   std::vector<Vector3> means_tracker_m;
   std::vector<std::size_t> leg;
   std::vector<bool> used;
 };
-inline ReferenceBlocks case_a_blocks() {
-  ReferenceBlocks blocks;
+inline ReferenceSegments case_a_segments() {
+  ReferenceSegments segments;
   for (const ReferenceRow& row : read_rows(small_file("caseA_blocks_noisy.csv"))) {
-    blocks.means_tracker_m.emplace_back(row.values.at(0), row.values.at(1), row.values.at(2));
-    blocks.leg.push_back(static_cast<std::size_t>(row.values.at(3)));
-    blocks.used.push_back(row.values.at(4) != 0);
+    segments.means_tracker_m.emplace_back(row.values.at(0), row.values.at(1), row.values.at(2));
+    segments.leg.push_back(static_cast<std::size_t>(row.values.at(3)));
+    segments.used.push_back(row.values.at(4) != 0);
   }
-  return blocks;
+  return segments;
 }
 
 template <class T>

@@ -11,7 +11,7 @@
 
 #include "abbe/calib/geometry/parameter_layout.hpp"
 #include "abbe/calib/internal/geometry/rigid_body_model.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/calib/otf/observe/observe.hpp"
 #include "abbe/calib/otf/run/path_frame.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
@@ -35,9 +35,9 @@ struct MadeRunOptions {
   unsigned noise_seed = 1;    ///< of the tracker's noise: same machine, another run
   double noise_factor = 1.0;  ///< of the default noise model; 0: exact
   double error_scale_m = 30e-6;
-  /// Tables of gauge G1: no rotation r of their own, which would be r^2 / 2 of strain in a pose
+  /// Tables of datum G1: no rotation r of their own, which would be r^2 / 2 of strain in a pose
   /// that is not linear.
-  bool in_gauge = false;
+  bool in_datum = false;
   double speed_m_s = 0.4;
   double rate_hz = 250.0;
   std::string chain = "[w X' b Y Z (C1) t]";
@@ -122,16 +122,17 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
   run.machine = coarse_machine(wanted.chain);
   run.path = case_a_path();
   run.machine.interpolation = wanted.interpolation;
-  run.options.block_samples = 10;  // 16 mm
+  run.options.segment_samples = 10;  // 16 mm
   run.options.orientation.scales_agree = true;
   const calib::ParameterLayout layout = layout_of(run.machine);
   run.truth = random_tables(layout, wanted.error_scale_m, random);
   run.T_machine_tracker = case_a_alignment(true);
   const Vector3& t = run.machine.target_offset_m;
-  if (wanted.in_gauge) {
+  if (wanted.in_datum) {
     Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
     U.head(run.truth.size()) = run.truth;
-    run.truth = calib::to_gauge(calib::Gauge::G1, layout, std::array{t}, U)->head(run.truth.size());
+    run.truth =
+        calib::to_datum(calib::ModelDatum::G1, layout, std::array{t}, U)->head(run.truth.size());
   }
 
   measure_run(run, wanted);

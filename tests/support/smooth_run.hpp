@@ -28,7 +28,7 @@ inline void draw_smooth_table(Eigen::Ref<Eigen::VectorXd> table, double sigma, d
   }
 }
 
-/// Gauge G1.
+/// Datum G1.
 inline Eigen::VectorXd smooth_tables(const calib::otf::Machine& machine,
                                      const SmoothRunOptions& wanted) {
   std::mt19937_64 random(wanted.seed);
@@ -42,7 +42,7 @@ inline Eigen::VectorXd smooth_tables(const calib::otf::Machine& machine,
                                 static_cast<Eigen::Index>(layout.node_count(table.motion.axis))),
                       sigma, 5e-6, random);
   }
-  return calib::to_gauge(calib::Gauge::G1, layout, std::array{machine.target_offset_m}, U)
+  return calib::to_datum(calib::ModelDatum::G1, layout, std::array{machine.target_offset_m}, U)
       ->head(static_cast<Eigen::Index>(layout.model_size()));
 }
 
@@ -60,7 +60,7 @@ inline MadeRun smooth_run(const SmoothRunOptions& wanted) {
                        *calib::equidistant_nodes(-0.4, 0.0, wanted.distance_m)};
   run.path = case_a_path();
   run.path.vertices_m.resize(std::min(run.path.vertices_m.size(), wanted.legs + 1));
-  run.options.block_samples = 10;  // 8 mm
+  run.options.segment_samples = 10;  // 8 mm
   run.options.orientation.scales_agree = true;
   run.T_machine_tracker = case_a_alignment(true);
   run.truth = smooth_tables(run.machine, wanted);

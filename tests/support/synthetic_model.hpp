@@ -36,7 +36,7 @@ inline calib::VolumetricModel synthetic_model(unsigned seed, double finer = 1.0)
                          (i & 4) != 0 ? -0.1 : -0.4);
   const std::vector<calib::Vector3> tools{{0.02, -0.015, -0.12}};
 
-  return calib::VolumetricModel::from_vector(layout, calib::Gauge::G1, tools, U,
+  return calib::VolumetricModel::from_vector(layout, calib::ModelDatum::G1, tools, U,
                                              0.5 * (covariance + covariance.transpose()),
                                              calib::ValidityVolume::hull_of(corners).value())
       .value();

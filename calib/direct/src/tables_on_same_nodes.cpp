@@ -16,7 +16,7 @@
 namespace abbe::calib::direct {
 namespace {
 
-constexpr auto kLine = StraightnessLine::EndPoints;  // gauge G2
+constexpr auto kLine = StraightnessLine::EndPoints;  // datum G2
 
 /// Those of the positions that are in the range of all tables of the axis, without near duplicates.
 Result<AxisNodes> common_nodes(const std::vector<UsedError>& used, Axis axis,

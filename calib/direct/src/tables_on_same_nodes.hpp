@@ -31,7 +31,7 @@ void leave_out_squareness(UsableErrors&, const ParameterLayout&);
 [[nodiscard]] Result<ParameterLayout> common_layout(const std::vector<UsedError>&,
                                                     const VolumetricModel&);
 
-/// Parameters of the common layout with their covariance, in gauge G2.
+/// Parameters of the common layout with their covariance, in datum G2.
 struct TableValues {
   Eigen::VectorXd U;
   Eigen::MatrixXd cov_U;

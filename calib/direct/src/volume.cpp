@@ -19,8 +19,8 @@ Result<VolumetricModel> model_of(const ParameterLayout& layout, const TableValue
   auto validity = ValidityVolume::hull_of(tensor_grid(ends));
   ABBE_TRY(validity);
   const Eigen::MatrixXd symmetric = 0.5 * (values.cov_U + values.cov_U.transpose());
-  return VolumetricModel::from_vector(layout, Gauge::G2, like.tool_offsets_m().first(1), values.U,
-                                      symmetric, std::move(*validity));
+  return VolumetricModel::from_vector(layout, ModelDatum::G2, like.tool_offsets_m().first(1),
+                                      values.U, symmetric, std::move(*validity));
 }
 
 /// At most about 21 nodes per axis, with both ends, inside the validity volume of the model.

@@ -80,7 +80,7 @@ std::vector<Eigen::Index> fixed_alone(const Eigen::MatrixXd& K) {
 Result<void> check_solvable(const Information& data, const DatumOptions& options) {
   if (!(options.weight > 0)) {
     return failure(ErrorCode::BadInput,
-                   message("adjustment: gauge weight ", options.weight, " must be positive"));
+                   message("adjustment: datum weight ", options.weight, " must be positive"));
   }
   return check_every_unknown(data, options);
 }
@@ -132,7 +132,7 @@ Result<BorderedTriangle> bordered_triangle(const Information& data, const Eigen:
         ErrorCode::RankDeficient,
         message("adjustment: ",
                 K.rows() == 0 ? "the data do not determine"
-                              : "neither the data nor the conditions of the gauge determine",
+                              : "neither the data nor the conditions of the datum determine",
                 " combinations of ",
                 largest_shares(null_space_of_rank(bordered, rank).share, options)));
   }

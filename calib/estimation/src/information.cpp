@@ -13,7 +13,7 @@ namespace {
 
 using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-Result<void> check_block(const Block& b, std::size_t unknowns) {
+Result<void> check_group(const ObservationGroup& b, std::size_t unknowns) {
   const Eigen::Index rows = b.y.size(), columns = std::ssize(b.unknowns);
   const Eigen::Index nuisances = std::ssize(b.u_nuisance);
   const bool sizes = b.A.rows() == rows && b.A.cols() == columns && b.L.cols() == nuisances &&
@@ -22,21 +22,21 @@ Result<void> check_block(const Block& b, std::size_t unknowns) {
   if (!sizes) {
     return failure(
         ErrorCode::BadInput,
-        message("block: ", rows, " observations, A ", b.A.rows(), " x ", b.A.cols(), " for ",
+        message("group: ", rows, " observations, A ", b.A.rows(), " x ", b.A.cols(), " for ",
                 columns, " unknowns, L ", b.L.rows(), " x ", b.L.cols(), " for ", nuisances,
                 " nuisances, covariance ", b.covariance.rows(), " x ", b.covariance.cols()));
   }
 
   for (const std::size_t unknown : b.unknowns) {
     if (unknown >= unknowns) {
-      return failure(ErrorCode::BadInput, message("block: unknown ", unknown, " of ", unknowns));
+      return failure(ErrorCode::BadInput, message("group: unknown ", unknown, " of ", unknowns));
     }
   }
 
   for (const double u : b.u_nuisance) {
     if (!(u > 0.0)) {
       return failure(ErrorCode::BadInput,
-                     message("block: prior uncertainty ", u, " of a nuisance must be positive"));
+                     message("group: prior uncertainty ", u, " of a nuisance must be positive"));
     }
   }
 
@@ -48,7 +48,7 @@ Result<void> check_block(const Block& b, std::size_t unknowns) {
 Result<void> whiten(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& rows) {
   if (covariance.cols() == 1) {
     if (!(covariance.minCoeff() > 0.0)) {
-      return failure(ErrorCode::DegenerateGeometry, "block: a variance is not positive");
+      return failure(ErrorCode::DegenerateGeometry, "group: a variance is not positive");
     }
     rows.array().colwise() /= covariance.col(0).array().sqrt();
     return {};
@@ -57,7 +57,7 @@ Result<void> whiten(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& rows) {
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) {
     return failure(ErrorCode::DegenerateGeometry,
-                   "block: the covariance of the observations is not positive definite");
+                   "group: the covariance of the observations is not positive definite");
   }
   factor.matrixL().solveInPlace(rows);
   return {};
@@ -124,32 +124,32 @@ void Information::add_rows(const Eigen::MatrixXd& A, const Eigen::VectorXd& y) {
   rows_ += static_cast<std::size_t>(rows.rows());
 }
 
-Result<void> Information::add(const Block& block) {
-  if (Result<void> valid = check_block(block, unknowns_); !valid) {
+Result<void> Information::add(const ObservationGroup& group) {
+  if (Result<void> valid = check_group(group, unknowns_); !valid) {
     return valid;
   }
 
-  const Eigen::Index columns = block.A.cols(), nuisances = block.L.cols();
-  Eigen::MatrixXd all(block.A.rows(), columns + 1 + nuisances);
-  all.leftCols(columns) = block.A;
-  all.col(columns) = block.y;
+  const Eigen::Index columns = group.A.cols(), nuisances = group.L.cols();
+  Eigen::MatrixXd all(group.A.rows(), columns + 1 + nuisances);
+  all.leftCols(columns) = group.A;
+  all.col(columns) = group.y;
   if (nuisances > 0) {
-    all.rightCols(nuisances) = block.L;
+    all.rightCols(nuisances) = group.L;
   }
 
-  if (Result<void> done = whiten(block.covariance, all); !done) {
+  if (Result<void> done = whiten(group.covariance, all); !done) {
     return done;
   }
 
   Eigen::MatrixXd rows = all.leftCols(columns + 1);
   if (nuisances > 0) {
-    const Eigen::MatrixXd with = with_priors(all, block.u_nuisance);
+    const Eigen::MatrixXd with = with_priors(all, group.u_nuisance);
     rows = eliminate(with.rightCols(nuisances), with.leftCols(columns + 1)).rows;
   }
 
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(rows.rows(), static_cast<Eigen::Index>(unknowns_));
   for (Eigen::Index k = 0; k < columns; ++k) {
-    A.col(static_cast<Eigen::Index>(block.unknowns[static_cast<std::size_t>(k)])) += rows.col(k);
+    A.col(static_cast<Eigen::Index>(group.unknowns[static_cast<std::size_t>(k)])) += rows.col(k);
   }
   add_rows(A, rows.col(columns));
   return {};

@@ -45,7 +45,7 @@ Eigen::MatrixXd basis_of_columns(Eigen::MatrixXd A) {
 
 }  // namespace
 
-AllParts::AllParts(std::span<const Part> parts, const GaugeCoordinates& c) {
+AllParts::AllParts(std::span<const Part> parts, const DatumCoordinates& c) {
   const std::vector<std::string> shared = shared_effects(parts);
   const Eigen::Index m = c.N.cols(), priors = std::ssize(shared);
   std::vector<DeterminingRows> rows;

@@ -55,7 +55,7 @@ std::size_t first_tested(std::size_t parts) {
 
 }  // namespace
 
-std::vector<Direction> directions(const GaugeCoordinates& c, const ParameterLayout& layout) {
+std::vector<Direction> directions(const DatumCoordinates& c, const ParameterLayout& layout) {
   constexpr double kLengthShare = 0.7, kAxesShare = 0.2;  // with kShareOfPairs: 1
   const Eigen::MatrixX3d of_axis = c.N.transpose() * axis_scale_columns(layout);
   std::vector<Direction> all{{kLength, false, of_axis.rowwise().sum(), kLengthShare}};
@@ -63,7 +63,7 @@ std::vector<Direction> directions(const GaugeCoordinates& c, const ParameterLayo
     all.push_back({message("scale of ", letter(a)), false,
                    of_axis.col(static_cast<Eigen::Index>(index(a))), 0.0});
   }
-  for (const GaugeGroup& group : c.groups) {
+  for (const DatumGroup& group : c.groups) {
     if (!group.motion && group.size == 1) {
       all.push_back({group.name, true, Eigen::VectorXd::Unit(c.N.cols(), group.first), 0.0});
     }
@@ -75,7 +75,7 @@ std::vector<Direction> directions(const GaugeCoordinates& c, const ParameterLayo
 }
 
 std::vector<DirectedFinding> directed_findings(std::span<const Part> parts,
-                                               const GaugeCoordinates& c,
+                                               const DatumCoordinates& c,
                                                const ParameterLayout& layout, double false_alarm) {
   constexpr double kLikely = 1e-3;  // an explanation must leave a larger probability
   const AllParts all(parts, c);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/joint/identify.hpp"
 
 namespace abbe::calib::joint {
@@ -22,7 +22,7 @@ struct Direction {
   double share = 0.0;  ///< of the false alarms of all tests
 };
 /// Length, scales of X, Y, Z, squareness.
-[[nodiscard]] std::vector<Direction> directions(const GaugeCoordinates&, const ParameterLayout&);
+[[nodiscard]] std::vector<Direction> directions(const DatumCoordinates&, const ParameterLayout&);
 
 /// A directed test with what the order of the causes needs.
 struct DirectedFinding {
@@ -30,7 +30,7 @@ struct DirectedFinding {
   double log_p = 0.0;  ///< of the improvement, as Explanation::log_p
 };
 [[nodiscard]] std::vector<DirectedFinding> directed_findings(std::span<const Part>,
-                                                             const GaugeCoordinates&,
+                                                             const DatumCoordinates&,
                                                              const ParameterLayout&,
                                                              double false_alarm);
 

@@ -41,7 +41,7 @@ DeterminingRows with_reversed_sign(DeterminingRows rows) {
   return rows;
 }
 
-DeterminingRows with_reversed_table(DeterminingRows rows, const GaugeGroup& group) {
+DeterminingRows with_reversed_table(DeterminingRows rows, const DatumGroup& group) {
   rows.A.middleCols(group.first, group.size) *= -1.0;
   return rows;
 }
@@ -58,10 +58,10 @@ class Hypotheses {
   Hypotheses(const PairProblem& pair, const Part& i, const Part& j, double least)
       : pair_(pair), i_(i), j_(j), least_(least) {}
 
-  void add_signs(const GaugeCoordinates& c) {
+  void add_signs(const DatumCoordinates& c) {
     test("the sign of V is reversed in " + i_.name + " or in " + j_.name, pair_.of_i(),
          with_reversed_sign(pair_.of_j()));
-    for (const GaugeGroup& group : c.groups) {
+    for (const DatumGroup& group : c.groups) {
       if (group.size > 0) {
         test("the sign of " + group.name + " is reversed in " + i_.name + " or in " + j_.name,
              pair_.of_i(), with_reversed_table(pair_.of_j(), group));
@@ -131,7 +131,7 @@ std::string text_of(const Direction& direction, const PairProblem::Freed& freed,
 
 /// The difference in one direction that fits best.
 void explain_by_directions(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
-                           const GaugeCoordinates& c, const ParameterLayout& layout) {
+                           const DatumCoordinates& c, const ParameterLayout& layout) {
   std::optional<Explanation> best;
   double best_excess = 0.0;  // beyond the limit, as in the directed tests
   for (const Direction& direction : directions(c, layout)) {
@@ -149,7 +149,7 @@ void explain_by_directions(PairTest& test, const PairProblem& pair, const Part& 
   }
 }
 
-TableDifference difference_of(const GaugeGroup& group, const GaugeCoordinates& c,
+TableDifference difference_of(const DatumGroup& group, const DatumCoordinates& c,
                               const PairProblem::Freed& freed, Eigen::Index first,
                               const ParameterLayout& layout) {
   TableDifference result{.table = group.name, .is_angle = group.is_angle()};
@@ -168,14 +168,14 @@ TableDifference difference_of(const GaugeGroup& group, const GaugeCoordinates& c
 }
 
 /// Columns of the coordinates of the tables.
-Eigen::MatrixXd columns_of(const std::vector<const GaugeGroup*>& tables, Eigen::Index m) {
+Eigen::MatrixXd columns_of(const std::vector<const DatumGroup*>& tables, Eigen::Index m) {
   Eigen::Index size = 0;
-  for (const GaugeGroup* group : tables) {
+  for (const DatumGroup* group : tables) {
     size += group->size;
   }
   Eigen::MatrixXd free = Eigen::MatrixXd::Zero(m, size);
   Eigen::Index at = 0;
-  for (const GaugeGroup* group : tables) {
+  for (const DatumGroup* group : tables) {
     free.block(group->first, at, group->size, group->size).setIdentity();
     at += group->size;
   }
@@ -183,19 +183,19 @@ Eigen::MatrixXd columns_of(const std::vector<const GaugeGroup*>& tables, Eigen::
 }
 
 /// The table whose freedom decreases X2 most significantly, with those already free.
-const GaugeGroup* most_significant_table(const PairProblem& pair, const GaugeCoordinates& c,
-                                         const std::vector<const GaugeGroup*>& already,
+const DatumGroup* most_significant_table(const PairProblem& pair, const DatumCoordinates& c,
+                                         const std::vector<const DatumGroup*>& already,
                                          double least, ChiSquare& best_test) {
   const Eigen::Index m = c.N.cols();
   const PairProblem::Freed before = pair.freed(columns_of(already, m));
-  const GaugeGroup* best = nullptr;
+  const DatumGroup* best = nullptr;
   double best_log_p = 0.0;
 
-  for (const GaugeGroup& group : c.groups) {
+  for (const DatumGroup& group : c.groups) {
     if (group.size == 0 || std::find(already.begin(), already.end(), &group) != already.end()) {
       continue;
     }
-    std::vector<const GaugeGroup*> tables = already;
+    std::vector<const DatumGroup*> tables = already;
     tables.push_back(&group);
     const PairProblem::Freed with = pair.freed(columns_of(tables, m));
     const double drop = with.drop - before.drop;
@@ -210,15 +210,15 @@ const GaugeGroup* most_significant_table(const PairProblem& pair, const GaugeCoo
   return best;
 }
 
-void explain_by_tables(PairTest& test, const PairProblem& pair, const GaugeCoordinates& c,
+void explain_by_tables(PairTest& test, const PairProblem& pair, const DatumCoordinates& c,
                        const ParameterLayout& layout) {
   const double least = least_likely(test);
-  std::vector<const GaugeGroup*> tables;
+  std::vector<const DatumGroup*> tables;
   std::vector<ChiSquare> tests;
   bool explained = false;
   while (!explained && tables.size() < kMostTables) {
     ChiSquare of_table;
-    const GaugeGroup* next = most_significant_table(pair, c, tables, least, of_table);
+    const DatumGroup* next = most_significant_table(pair, c, tables, least, of_table);
     if (next == nullptr || of_table.p > least) {
       break;
     }
@@ -257,7 +257,7 @@ std::string text(const TableDifference& d) {
 }
 
 void explain(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
-             const GaugeCoordinates& c, const ParameterLayout& layout) {
+             const DatumCoordinates& c, const ParameterLayout& layout) {
   Hypotheses mistakes(pair, i, j, least_likely(test));
   mistakes.add_signs(c);
   mistakes.add_units();

@@ -7,7 +7,7 @@
 namespace abbe::calib::joint {
 
 /// Fills the explanations and tables of a test.
-void explain(PairTest&, const PairProblem&, const Part& i, const Part& j, const GaugeCoordinates&,
+void explain(PairTest&, const PairProblem&, const Part& i, const Part& j, const DatumCoordinates&,
              const ParameterLayout&);
 
 }  // namespace abbe::calib::joint

@@ -10,7 +10,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/joint/determining_rows.hpp"
 #include "abbe/calib/internal/joint/pair_problem.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
 #include "abbe/result/try.hpp"
@@ -95,10 +95,10 @@ std::vector<std::string> all_effects(std::span<const Part> parts) {
 }
 
 /// Name of the table of a coordinate, or of an effect.
-std::string label_of(std::size_t unknown, const GaugeCoordinates& c,
+std::string label_of(std::size_t unknown, const DatumCoordinates& c,
                      const std::vector<std::string>& effects) {
   const auto at = static_cast<Eigen::Index>(unknown);
-  for (const GaugeGroup& group : c.groups) {
+  for (const DatumGroup& group : c.groups) {
     if (at >= group.first && at < group.first + group.size) {
       return group.name;
     }
@@ -181,7 +181,7 @@ Result<std::vector<PairTest>> test_pairs(std::span<const Part> parts, const Comm
                                          const JointOptions& options) {
   ABBE_TRY(check_test(parts, common, options));
 
-  const GaugeCoordinates c = gauge_coordinates(common.basis);
+  const DatumCoordinates c = datum_coordinates(common.basis);
   const double pairs = 0.5 * static_cast<double>(parts.size() * (parts.size() - 1));
   const double limit = kShareOfPairs * options.false_alarm / pairs;
   std::vector<PairTest> tests;
@@ -203,7 +203,7 @@ Result<std::vector<PairTest>> test_pairs(std::span<const Part> parts, const Comm
 Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& common) {
   ABBE_TRY(check_parts(parts, common, 1));
 
-  const GaugeCoordinates c = gauge_coordinates(common.basis);
+  const DatumCoordinates c = datum_coordinates(common.basis);
   const std::vector<std::string> effects = all_effects(parts);
   const Eigen::Index m = c.N.cols();
   estimation::Information sum(static_cast<std::size_t>(m) + effects.size());
@@ -215,7 +215,7 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
     sum.add_prior(static_cast<std::size_t>(m) + k, 0.0, 1.0);
   }
 
-  // The coordinates satisfy the conditions of the gauge: no other condition is left.
+  // The coordinates satisfy the conditions of the datum: no other condition is left.
   const estimation::Datum no_conditions(
       Eigen::MatrixXd(0, static_cast<Eigen::Index>(sum.unknowns())));
   const Result<estimation::DatumSolution> solved = no_conditions.solve(
@@ -230,8 +230,8 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
   const Eigen::MatrixXd of_e = solved->covariance.topLeftCorner(m, m);
   const Eigen::MatrixXd C = c.N * of_e * c.N.transpose();
   Result<VolumetricModel> model =
-      VolumetricModel::from_vector(common.basis, Gauge::G2, std::array{common.tool_offset_m}, U,
-                                   0.5 * (C + C.transpose()), *std::move(validity))
+      VolumetricModel::from_vector(common.basis, ModelDatum::G2, std::array{common.tool_offset_m},
+                                   U, 0.5 * (C + C.transpose()), *std::move(validity))
           .and_then([&](const VolumetricModel& of_tables) {
             return of_tables.with_misfit(largest_misfit(parts));
           });
@@ -254,7 +254,7 @@ Result<std::vector<DirectedTest>> test_directions(std::span<const Part> parts,
                                                   const JointOptions& options) {
   ABBE_TRY(check_test(parts, common, options));
   std::vector<DirectedTest> tests;
-  for (DirectedFinding& f : directed_findings(parts, gauge_coordinates(common.basis),
+  for (DirectedFinding& f : directed_findings(parts, datum_coordinates(common.basis),
                                               common.basis.layout(), options.false_alarm)) {
     tests.push_back(std::move(f.test));
   }
@@ -267,7 +267,7 @@ Result<JointIdentification> identify(std::span<const Part> parts, const CommonTa
   ABBE_TRY(pairs);
 
   const std::vector<DirectedFinding> findings = directed_findings(
-      parts, gauge_coordinates(common.basis), common.basis.layout(), options.false_alarm);
+      parts, datum_coordinates(common.basis), common.basis.layout(), options.false_alarm);
   JointIdentification result{
       .pairs = *std::move(pairs), .directed = {}, .joint = {}, .contradictions = {}};
   result.contradictions = contradictions_of(result.pairs, findings, parts);

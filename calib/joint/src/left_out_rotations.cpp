@@ -3,7 +3,7 @@
 #include <array>
 
 #include "abbe/calib/estimation/datum.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 
 namespace abbe::calib::joint {
 
@@ -57,9 +57,9 @@ Result<Eigen::MatrixXd> LeftOutRotations::of_parameters() const {
     return Eigen::MatrixXd(model, 0);
   }
 
-  const estimation::Datum gauge(gauge_conditions(Gauge::G2, common_.basis, layout.fit_size()));
+  const estimation::Datum datum(datum_conditions(ModelDatum::G2, common_.basis, layout.fit_size()));
   const Eigen::MatrixXd free = unobservable_combinations(layout, std::array{common_.tool_offset_m});
-  return gauge.transformation(free).map(
+  return datum.transformation(free).map(
       [&](const Eigen::MatrixXd& S) { return Eigen::MatrixXd((S * effect).topRows(model)); });
 }
 

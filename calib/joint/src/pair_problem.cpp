@@ -22,7 +22,7 @@ std::vector<std::string> shared_effects(const Part& i, const Part& j) {
 
 }  // namespace
 
-PairProblem::PairProblem(const Part& i, const Part& j, const GaugeCoordinates& c)
+PairProblem::PairProblem(const Part& i, const Part& j, const DatumCoordinates& c)
     : N_(c.N),
       shared_(shared_effects(i, j)),
       i_(in_coordinates(i.information, i.effects, N_, shared_)),

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "abbe/calib/internal/base/message.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 
 namespace abbe::calib::joint {
 
@@ -15,8 +15,8 @@ Result<CommonTables> tables_of(const VolumetricModel& model) {
   if (tables == nullptr) {
     return not_applicable("has polynomials, must have tables");
   }
-  if (!is_of_tables(model.gauge())) {
-    return not_applicable("is not in gauge G1 or G2");
+  if (!is_of_tables(model.datum())) {
+    return not_applicable("is not in datum G1 or G2");
   }
   if (model.tool_offsets_m().size() != 1) {
     return not_applicable(
@@ -27,7 +27,7 @@ Result<CommonTables> tables_of(const VolumetricModel& model) {
         "depends on the direction of travel, which the common tables do not: identify the runs "
         "without backlash");
   }
-  if (!is_in_gauge(gauge_coordinates(*tables), model.covariance())) {
+  if (!is_in_datum(datum_coordinates(*tables), model.covariance())) {
     return not_applicable(
         "has half its backlash in the covariance, which does not average out over "
         "parts: identify the runs without backlash");

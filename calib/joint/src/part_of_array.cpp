@@ -6,7 +6,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/evemu/solve/artefact_rows.hpp"
-#include "abbe/calib/internal/evemu/solve/pose_blocks.hpp"
+#include "abbe/calib/internal/evemu/solve/pose_groups.hpp"
 #include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
 #include "abbe/calib/internal/joint/determining_rows.hpp"
 #include "abbe/calib/internal/joint/left_out_rotations.hpp"
@@ -16,7 +16,7 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// The unknowns of the blocks: parameters, effects of the scales, left-out rotations, errors of the
+/// The unknowns of the groups: parameters, effects of the scales, left-out rotations, errors of the
 /// array.
 class ArrayUnknowns {
  public:
@@ -72,11 +72,11 @@ std::vector<std::size_t> counted(std::size_t first, std::size_t end) {
   return all;
 }
 
-/// Information of all blocks about all unknowns, with s = `s_m`.
+/// Information of all groups about all unknowns, with s = `s_m`.
 Result<estimation::Information> information_of_array(const evemu::Observations& o,
                                                      const ArrayUnknowns& unknowns, double s_m,
                                                      const Eigen::VectorXd& U) {
-  evemu::PoseBlockOptions options{.s_m = s_m};
+  evemu::PoseGroupOptions options{.s_m = s_m};
   const ModelBasis basis(unknowns.common().basis);
   if (U.size() > 0) {
     options.V_at_m = [&](const Vector3& reading_m) {
@@ -85,11 +85,11 @@ Result<estimation::Information> information_of_array(const evemu::Observations& 
     };
   }
 
-  const auto blocks = evemu::pose_blocks(o, unknowns.design(o.machine.tool_offset_m), options);
-  ABBE_TRY(blocks);
-  estimation::Information sum(blocks->front().unknowns.size());
-  for (const estimation::Block& block : *blocks) {
-    ABBE_TRY(sum.add(block));
+  const auto groups = evemu::pose_groups(o, unknowns.design(o.machine.tool_offset_m), options);
+  ABBE_TRY(groups);
+  estimation::Information sum(groups->front().unknowns.size());
+  for (const estimation::ObservationGroup& group : *groups) {
+    ABBE_TRY(sum.add(group));
   }
   return sum;
 }

@@ -6,9 +6,9 @@
 #include "abbe/calib/estimation/datum.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "abbe/calib/joint/part.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/result/try.hpp"
 
 namespace abbe::calib::joint {
@@ -25,7 +25,7 @@ std::vector<Table> left_out_tables(const ParameterLayout& all, const ParameterLa
   return left_out;
 }
 
-/// All 18 tables, not in a gauge, from the common ones and the left-out rotations phi (columns
+/// All 18 tables, not in a datum, from the common ones and the left-out rotations phi (columns
 /// behind them). The translations of the axis of phi contain phi x (tool of the common tables).
 Eigen::MatrixXd all_tables_of(const CommonTables& common, const ParameterLayout& all) {
   const ParameterLayout& given = common.basis.layout();
@@ -60,13 +60,13 @@ Eigen::MatrixXd all_tables_of(const CommonTables& common, const ParameterLayout&
   return M;
 }
 
-/// The same in gauge G2 of all tables, which the adjustment of the bar has.
-Result<Eigen::MatrixXd> all_tables_in_gauge(const CommonTables& common, const TableBasis& all) {
+/// The same in datum G2 of all tables, which the adjustment of the bar has.
+Result<Eigen::MatrixXd> all_tables_in_datum(const CommonTables& common, const TableBasis& all) {
   // Three tools that are not on a line: the tables describe every tool.
   const std::array tools_m{Vector3(0.0, 0.0, 0.0), Vector3(0.1, 0.0, 0.0), Vector3(0.0, 0.1, 0.0)};
   const ParameterLayout& layout = all.layout();
-  const estimation::Datum gauge(gauge_conditions(Gauge::G2, all, layout.fit_size()));
-  return gauge.transformation(unobservable_combinations(layout, tools_m))
+  const estimation::Datum datum(datum_conditions(ModelDatum::G2, all, layout.fit_size()));
+  return datum.transformation(unobservable_combinations(layout, tools_m))
       .map([&](const Eigen::MatrixXd& S) {
         const auto model = static_cast<Eigen::Index>(layout.model_size());
         return Eigen::MatrixXd((S * all_tables_of(common, layout)).topRows(model));
@@ -117,9 +117,9 @@ struct BarRows {
   Eigen::VectorXd y;
 };
 
-Result<BarRows> rows_of_bar(const mfb::JointSystem& system, const mfb::Observations& o,
+Result<BarRows> rows_of_bar(const mfb::WholeSystem& system, const mfb::Observations& o,
                             const CommonTables& common) {
-  const Result<Eigen::MatrixXd> all = all_tables_in_gauge(common, o.basis);
+  const Result<Eigen::MatrixXd> all = all_tables_in_datum(common, o.basis);
   ABBE_TRY(all);
   const mfb::SharedUnknowns& shared = system.shared;
   Eigen::MatrixXd free(shared.parameters(), all->cols());
@@ -179,7 +179,7 @@ Result<Part> part_of_bar(std::string name, const mfb::Observations& o, const Com
   if (Result<void> valid = check_bar(o, common); !valid) {
     return tl::unexpected(in_this_part(valid.error()));
   }
-  const Result<mfb::JointSystem> system = mfb::joint_system(o, {.u_roll_rad = options.u_roll_rad});
+  const Result<mfb::WholeSystem> system = mfb::whole_system(o, {.u_roll_rad = options.u_roll_rad});
   if (!system) {
     return tl::unexpected(in_this_part(system.error()));
   }

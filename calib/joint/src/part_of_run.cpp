@@ -8,7 +8,7 @@
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
 #include "abbe/calib/internal/joint/left_out_rotations.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/internal/model/offset_of_data.hpp"
 #include "abbe/calib/joint/part.hpp"
 #include "abbe/result/try.hpp"
@@ -190,7 +190,7 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
   ABBE_TRY(check_same_layout(name, model, common));
   ABBE_TRY(check_offset(name, effects, common));
 
-  const Eigen::MatrixXd N = gauge_coordinates(common.basis).N;
+  const Eigen::MatrixXd N = datum_coordinates(common.basis).N;
   SharedColumns shared = shared_columns(common.basis.layout(), effects);
   const Eigen::MatrixXd G = N.transpose() * shared.G;
   const Result<ScaledTriangle> triangle =

@@ -30,7 +30,7 @@ std::vector<Vector3> evaluation_points(const VolumetricModel& model) {
 }
 
 /// Largest |V| without the rigid motion that fits best: a rigid motion of V is no error of the
-/// machine, and in the gauge of a model it can be large where the axes are far from machine zero.
+/// machine, and in the datum of a model it can be large where the axes are far from machine zero.
 double max_error_m(const VolumetricModel& model, const std::vector<Vector3>& at, const Vector3& t) {
   std::vector<Vector3> points_m, V_m;
   for (const Vector3& q : at) {

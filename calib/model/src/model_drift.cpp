@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "abbe/calib/internal/base/message.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/internal/statistics/chi2_tail.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
 #include "abbe/result/try.hpp"
@@ -48,7 +48,7 @@ bool holds_for_tools_of(const VolumetricModel& a, const VolumetricModel& b) {
 
 /// The difference of two models in whitened coordinates: w ~ N(0, I) if nothing changed.
 struct WhitenedDifference {
-  GaugeCoordinates coordinates;
+  DatumCoordinates coordinates;
   Eigen::VectorXd w;
   Eigen::MatrixXd W;  ///< change of w per coordinate
   std::size_t untested = 0;
@@ -56,7 +56,7 @@ struct WhitenedDifference {
 
 Result<WhitenedDifference> whitened_difference(const VolumetricModel& run,
                                                const VolumetricModel& active) {
-  WhitenedDifference d{.coordinates = gauge_coordinates(*run.tables()), .w = {}, .W = {}};
+  WhitenedDifference d{.coordinates = datum_coordinates(*run.tables()), .w = {}, .W = {}};
   const Eigen::MatrixXd& N = d.coordinates.N;
   const Eigen::MatrixXd C = N.transpose() * (run.covariance() + active.covariance()) * N;
   const Eigen::VectorXd scale = C.diagonal().unaryExpr(
@@ -101,9 +101,9 @@ struct Limits {
   double smooth = 0.0, any = 0.0;
 };
 
-Limits limits_of(const GaugeCoordinates& c, double false_alarm) {
+Limits limits_of(const DatumCoordinates& c, double false_alarm) {
   double smooth = 0.0, any = 1.0;  // all tables together
-  for (const GaugeGroup& group : c.groups) {
+  for (const DatumGroup& group : c.groups) {
     smooth += group.size > 0 ? 1.0 : 0.0;
     any += group.size > 1 ? 1.0 : 0.0;
   }
@@ -115,10 +115,10 @@ Limits limits_of(const GaugeCoordinates& c, double false_alarm) {
 class Freed {
  public:
   Freed(const WhitenedDifference& d, const std::vector<bool>& drifted,
-        const GaugeGroup* except = nullptr) {
+        const DatumGroup* except = nullptr) {
     std::vector<Eigen::Index> columns;
     for (std::size_t i = 0; i < drifted.size(); ++i) {
-      const GaugeGroup& group = d.coordinates.groups[i];
+      const DatumGroup& group = d.coordinates.groups[i];
       for (Eigen::Index k = 0; drifted[i] && &group != except && k < group.size; ++k) {
         columns.push_back(group.first + k);
       }
@@ -149,11 +149,11 @@ struct Projected {
   Eigen::VectorXd w;
   Eigen::MatrixXd W;
 
-  Projected(const WhitenedDifference& d, const GaugeGroup& group, const Freed& freed)
+  Projected(const WhitenedDifference& d, const DatumGroup& group, const Freed& freed)
       : w(freed.without(d.w)), W(freed.without(d.W.middleCols(group.first, group.size))) {}
 };
 
-Significance smooth_test(const WhitenedDifference& d, const GaugeGroup& group, const Projected& p,
+Significance smooth_test(const WhitenedDifference& d, const DatumGroup& group, const Projected& p,
                          const ParameterLayout& layout, double limit) {
   Eigen::VectorXd of_all = Eigen::VectorXd::Zero(d.coordinates.N.rows());
   of_all.segment(group.offset, group.count) = smooth_change(group, layout);
@@ -176,7 +176,7 @@ Significance any_test(const Projected& p, double limit) {
   return significance(of_table.squaredNorm(), static_cast<std::size_t>(qr.rank()), limit, false);
 }
 
-Significance most_significant(const WhitenedDifference& d, const GaugeGroup& group,
+Significance most_significant(const WhitenedDifference& d, const DatumGroup& group,
                               const Freed& freed, const ParameterLayout& layout,
                               const Limits& limits) {
   const Projected p(d, group, freed);
@@ -189,7 +189,7 @@ Significance most_significant(const WhitenedDifference& d, const GaugeGroup& gro
 }
 
 /// Estimates the change of a table where it is largest.
-void estimate_change(TableChange& change, const WhitenedDifference& d, const GaugeGroup& group,
+void estimate_change(TableChange& change, const WhitenedDifference& d, const DatumGroup& group,
                      const Freed& freed, const ParameterLayout& layout) {
   const Projected p(d, group, freed);
   const auto qr = decomposed(p.W);
@@ -238,7 +238,7 @@ std::string size_of(const TableChange& c, std::string_view before_u) {
 /// Takes the most significant table as changed, until no test exceeds its limit.
 std::vector<bool> find_drifted(const WhitenedDifference& d, const ParameterLayout& layout,
                                const Limits& limits, std::vector<Significance>& found) {
-  const std::vector<GaugeGroup>& groups = d.coordinates.groups;
+  const std::vector<DatumGroup>& groups = d.coordinates.groups;
   std::vector<bool> drifted(groups.size(), false);
   found.assign(groups.size(), {});
 
@@ -310,8 +310,8 @@ Result<void> check_same_parameters(const VolumetricModel& a, const VolumetricMod
   if (a.tables() == nullptr || b.tables() == nullptr) {
     return not_comparable("one of them is a polynomial model, not one of tables");
   }
-  if (!is_of_tables(a.gauge()) || !is_of_tables(b.gauge())) {
-    return not_comparable("one of them is not in gauge G1 or G2");
+  if (!is_of_tables(a.datum()) || !is_of_tables(b.datum())) {
+    return not_comparable("one of them is not in datum G1 or G2");
   }
 
   if (a.chain().order_w_to_t() != b.chain().order_w_to_t() ||
@@ -355,7 +355,7 @@ Result<DriftTest> test_drift(const VolumetricModel& run, const VolumetricModel& 
   ABBE_TRY(d);
 
   const ParameterLayout& layout = run.tables()->layout();
-  const std::vector<GaugeGroup>& groups = d->coordinates.groups;
+  const std::vector<DatumGroup>& groups = d->coordinates.groups;
   const Limits limits = limits_of(d->coordinates, options.false_alarm);
   std::vector<Significance> found;
   const std::vector<bool> drifted = find_drifted(*d, layout, limits, found);

@@ -10,7 +10,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/geometry/axis_scale_columns.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/internal/model/misfit_in_V.hpp"
 #include "abbe/calib/internal/model/offset_of_data.hpp"
 #include "abbe/calib/model/model_drift.hpp"
@@ -19,12 +19,12 @@
 namespace abbe::calib {
 namespace {
 
-bool has_group(const GaugeCoordinates& c, const std::string& table) {
+bool has_group(const DatumCoordinates& c, const std::string& table) {
   return std::any_of(c.groups.begin(), c.groups.end(),
-                     [&](const GaugeGroup& group) { return group.name == table; });
+                     [&](const DatumGroup& group) { return group.name == table; });
 }
 
-Result<void> check_update_options(const UpdateOptions& o, const GaugeCoordinates& c) {
+Result<void> check_update_options(const UpdateOptions& o, const DatumCoordinates& c) {
   // This form of the conditions refuses NaN.
   if (!(o.forgetting > 0.0 && o.forgetting <= 1.0)) {
     return failure(ErrorCode::BadInput,
@@ -56,7 +56,7 @@ Result<void> check_update_options(const UpdateOptions& o, const GaugeCoordinates
   return {};
 }
 
-double process_noise(const GaugeGroup& group, const UpdateOptions& o) {
+double process_noise(const DatumGroup& group, const UpdateOptions& o) {
   const auto own = std::find_if(o.of_tables.begin(), o.of_tables.end(),
                                 [&](const TableNoise& noise) { return noise.table == group.name; });
   const double of_all = group.is_angle() ? o.angle_rad_per_root_day : o.length_m_per_root_day;
@@ -64,9 +64,9 @@ double process_noise(const GaugeGroup& group, const UpdateOptions& o) {
 }
 
 /// Q of one table: q^2 (I + s s^T), s: its smooth change; q^2 for squareness.
-void add_process_noise(Eigen::MatrixXd& C, const GaugeCoordinates& c, const ParameterLayout& layout,
+void add_process_noise(Eigen::MatrixXd& C, const DatumCoordinates& c, const ParameterLayout& layout,
                        const UpdateOptions& o) {
-  for (const GaugeGroup& group : c.groups) {
+  for (const DatumGroup& group : c.groups) {
     const double q = process_noise(group, o);
     auto of_group = C.block(group.first, group.first, group.size, group.size);
     of_group.diagonal().array() += q * q;
@@ -124,7 +124,7 @@ Result<void> check_offsets(const ModelWithOffset& previous, const ModelWithOffse
 
 /// Columns G: a relative error of all ranges changes all positioning tables with slope 1, one of
 /// the scale of an axis that of this axis.
-Eigen::MatrixXd common_part(const GaugeCoordinates& c, const ParameterLayout& layout,
+Eigen::MatrixXd common_part(const DatumCoordinates& c, const ParameterLayout& layout,
                             const UpdateOptions& o) {
   const Eigen::MatrixX3d of_axis = axis_scale_columns(layout);
   Eigen::MatrixX4d G(of_axis.rows(), 4);
@@ -196,10 +196,10 @@ class Update {
   estimation::Information sum_;
 };
 
-std::vector<Eigen::Index> free_coordinates_of(const GaugeCoordinates& c,
+std::vector<Eigen::Index> free_coordinates_of(const DatumCoordinates& c,
                                               const std::vector<std::string>& without) {
   std::vector<Eigen::Index> kept;
-  for (const GaugeGroup& group : c.groups) {
+  for (const DatumGroup& group : c.groups) {
     const bool out = std::find(without.begin(), without.end(), group.name) != without.end();
     for (Eigen::Index k = 0; !out && k < group.size; ++k) {
       kept.push_back(group.first + k);
@@ -223,7 +223,7 @@ Result<ModelWithOffset> update_model(const ModelWithOffset& before, const ModelW
   }
 
   const ParameterLayout& layout = run.tables()->layout();
-  const GaugeCoordinates c = gauge_coordinates(*run.tables());
+  const DatumCoordinates c = datum_coordinates(*run.tables());
   ABBE_TRY(check_update_options(options, c));
   ABBE_TRY(check_offsets(before, now));
 
@@ -282,7 +282,7 @@ Result<ModelWithOffset> update_model(const ModelWithOffset& before, const ModelW
   }
 
   return VolumetricModel::from_vector(
-             *run.tables(), run.gauge(), run.tool_offsets_m(), N * x.head(n), covariance,
+             *run.tables(), run.datum(), run.tool_offsets_m(), N * x.head(n), covariance,
              options.renewed.empty() ? previous.validity() : run.validity())
       .and_then([&](const VolumetricModel& updated) {
         return updated.with_misfit(larger_misfit(previous.misfit(), run.misfit()));

@@ -130,7 +130,7 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
   return PolynomialModel::of(*std::move(design), d.polynomials->ball1_m, std::move(c_m),
                              d.covariance)
       .and_then([&](PolynomialModel model) {
-        return VolumetricModel::from_polynomials(std::move(model), d.gauge,
+        return VolumetricModel::from_polynomials(std::move(model), d.datum,
                                                  d.tool_offsets_m.front(), *std::move(validity));
       });
 }
@@ -156,7 +156,7 @@ Result<VolumetricModel> tables_from(const ModelDescription& d) {
   Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
   ABBE_TRY(validity);
 
-  return VolumetricModel::from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance,
+  return VolumetricModel::from_vector(*layout, d.datum, d.tool_offsets_m, U, d.covariance,
                                       *std::move(validity), d.interpolation);
 }
 
@@ -184,7 +184,7 @@ ModelDescription VolumetricModel::description() const {
   d.chain = chain();
   d.nodes = tables() == nullptr ? nodes_ : tables()->layout().nodes();
   d.interpolation = interpolation().value_or(Interpolation::Linear);
-  d.gauge = gauge_;
+  d.datum = datum_;
   d.tool_offsets_m = tool_offsets_m_;
   d.parameters = parameters();
   d.covariance = covariance_;

@@ -84,13 +84,13 @@ Result<void> check_covariance(const Eigen::MatrixXd& C) {
   }
 
   // The covariance is scaled to correlations. A variance below 1e-12 of the largest belongs to a
-  // parameter that the gauge fixes, and is only rounding.
+  // parameter that the datum fixes, and is only rounding.
   const double least = 1e-12 * (C.size() > 0 ? C.diagonal().maxCoeff() : 0.0);
   const Eigen::VectorXd scale = C.diagonal().unaryExpr(
       [&](double variance) { return least > 0 ? 1 / std::sqrt(std::max(variance, least)) : 1.0; });
   Eigen::MatrixXd correlation = scale.asDiagonal() * C * scale.asDiagonal();
 
-  // The covariance of parameters that satisfy gauge conditions is singular. With ill-conditioned
+  // The covariance of parameters that satisfy datum conditions is singular. With ill-conditioned
   // data (condition number 1e5) rounding changes its eigenvalues by 1e-6, so zero may become
   // negative.
   constexpr double kRounding = 1e-6;
@@ -105,21 +105,19 @@ Result<void> check_covariance(const Eigen::MatrixXd& C) {
   return {};
 }
 
-Result<VolumetricModel> VolumetricModel::from_vector(const TableBasis& basis, Gauge gauge,
+Result<VolumetricModel> VolumetricModel::from_vector(const TableBasis& basis, ModelDatum datum,
                                                      std::span<const Vector3> tool_offsets_m,
                                                      const Eigen::VectorXd& U,
                                                      const Eigen::MatrixXd& covariance,
                                                      ValidityVolume validity) {
-  return from_vector(basis.layout(), gauge, tool_offsets_m, U, covariance, std::move(validity),
+  return from_vector(basis.layout(), datum, tool_offsets_m, U, covariance, std::move(validity),
                      basis.interpolation(Axis::X).kind());
 }
 
-Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layout, Gauge gauge,
-                                                     std::span<const Vector3> tool_offsets_m,
-                                                     const Eigen::VectorXd& U,
-                                                     const Eigen::MatrixXd& covariance,
-                                                     ValidityVolume validity,
-                                                     Interpolation interpolation) {
+Result<VolumetricModel> VolumetricModel::from_vector(
+    const ParameterLayout& layout, ModelDatum datum, std::span<const Vector3> tool_offsets_m,
+    const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume validity,
+    Interpolation interpolation) {
   if (U.size() != static_cast<Eigen::Index>(layout.model_size())) {
     return failure(ErrorCode::BadInput, message("model: ", U.size(), " values for ",
                                                 layout.model_size(), " parameters"));
@@ -148,14 +146,14 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
 
   const bool cubic = interpolation != Interpolation::Linear;
   const Vector3 squareness_from_m =
-      gauge == Gauge::G1 ? Vector3(Vector3::Zero()) : reference_position_m(layout.nodes());
+      datum == ModelDatum::G1 ? Vector3(Vector3::Zero()) : reference_position_m(layout.nodes());
   Result<TableBasis> basis = TableBasis::of(layout.with_squareness_from(squareness_from_m),
                                             TableOptions::all_axes(interpolation));
   ABBE_TRY(basis);
 
   VolumetricModel model(*std::move(basis),
                         cubic ? checked_nodes_of_cubic(layout.nodes()) : layout.nodes());
-  model.gauge_ = gauge;
+  model.datum_ = datum;
   model.tool_offsets_m_.assign(tool_offsets_m.begin(), tool_offsets_m.end());
   const ToolSpan tools = tool_span(tool_offsets_m);
   model.holds_for_any_tool_ = tools.any;
@@ -171,16 +169,16 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   return model;
 }
 
-Result<VolumetricModel> VolumetricModel::from_polynomials(PolynomialModel model, Gauge gauge,
+Result<VolumetricModel> VolumetricModel::from_polynomials(PolynomialModel model, ModelDatum datum,
                                                           const Vector3& tool_offset_m,
                                                           ValidityVolume validity) {
   if (!tool_offset_m.allFinite()) {
     return failure(ErrorCode::NotFinite, "model: the tool offset is not a number");
   }
 
-  if (is_of_tables(gauge)) {
-    return failure(ErrorCode::BadInput, message("model: gauge ", name(gauge),
-                                                " is for tables; polynomials need gauge Ball1"));
+  if (is_of_tables(datum)) {
+    return failure(ErrorCode::BadInput, message("model: datum ", name(datum),
+                                                " is for tables; polynomials need datum Ball1"));
   }
 
   MachineNodes nodes = grid_over(validity);
@@ -194,7 +192,7 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(PolynomialModel model,
   Eigen::VectorXd c_m = model.c_m();
   Eigen::MatrixXd covariance_m2 = model.covariance_m2();
   VolumetricModel result(std::move(model), std::move(nodes));
-  result.gauge_ = gauge;
+  result.datum_ = datum;
   result.tool_offsets_m_ = {tool_offset_m};
   result.U_ = std::move(c_m);
   result.covariance_ = std::move(covariance_m2);

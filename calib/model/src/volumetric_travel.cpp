@@ -33,16 +33,16 @@ Result<void> check_sizes(const TravelDifferences& d, const TableBasis& basis) {
 
 /// Covariance of tables and differences: without half the differences, which the covariance of the
 /// mean contains.
-Eigen::MatrixXd joint_covariance(const VolumetricModel& model) {
+Eigen::MatrixXd whole_covariance(const VolumetricModel& model) {
   const TravelDifferences& d = *model.travel();
   const Eigen::MatrixXd half = half_differences(*model.travel_tables(), d.D);
   const Eigen::Index n = d.cov_U_D.rows(), m = d.D.size();
-  Eigen::MatrixXd joint(n + m, n + m);
-  joint.topLeftCorner(n, n) = model.covariance() - half * half.transpose();
-  joint.topRightCorner(n, m) = d.cov_U_D;
-  joint.bottomLeftCorner(m, n) = d.cov_U_D.transpose();
-  joint.bottomRightCorner(m, m) = d.covariance;
-  return joint;
+  Eigen::MatrixXd whole(n + m, n + m);
+  whole.topLeftCorner(n, n) = model.covariance() - half * half.transpose();
+  whole.topRightCorner(n, m) = d.cov_U_D;
+  whole.bottomLeftCorner(m, n) = d.cov_U_D.transpose();
+  whole.bottomRightCorner(m, m) = d.covariance;
+  return whole;
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ Result<VolumetricModel> VolumetricModel::with_travel(TravelDifferences differenc
   Eigen::VectorXd U_and_D(U_.size() + differences.D.size());
   U_and_D << U_, differences.D;
   model.travel_ = TravelForm{*std::move(basis), std::move(differences), std::move(U_and_D)};
-  if (!check_covariance(joint_covariance(model))) {
+  if (!check_covariance(whole_covariance(model))) {
     return failure(ErrorCode::BadInput,
                    "model: covariance of the differences between the directions of travel is not "
                    "positive semidefinite together with that of the tables");

@@ -224,19 +224,20 @@ void add_calibrate_artefact(CLI::App& parent, int& exit) {
       "--touches", arguments->touches,
       "file for the touches (default: in the folder of the output); .partial.csv if the run fails");
   command
-      ->add_option("--at", arguments->at_mm,
+      ->add_option("--at-mm", arguments->at_mm,
                    "x,y,z: position of the artefact's origin in the machine, mm")
       ->delimiter(',')
       ->expected(3)
       ->required();
-  command->add_option("--turn", arguments->turn_deg, "rotation of the artefact about z, degrees");
+  command->add_option("--turn-deg", arguments->turn_deg,
+                      "rotation of the artefact about z, degrees");
   command->add_option("--points", arguments->points, "touches per ball, at least 5")
       ->capture_default_str();
   command
       ->add_option("--block-points", arguments->face_points, "touches per block face, at least 4")
       ->capture_default_str();
   command
-      ->add_option("--clearance", arguments->clearance_mm,
+      ->add_option("--clearance-mm", arguments->clearance_mm,
                    "distance between tip and artefact on the paths, mm")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -347,12 +347,12 @@ void add_calibrate_bar(CLI::App& parent, int& exit) {
       ->check(CLI::Range(1, 50))
       ->capture_default_str();
   command
-      ->add_option("--clearance", arguments->clearance_mm,
+      ->add_option("--clearance-mm", arguments->clearance_mm,
                    "distance between tip and surface before a touch, mm")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
-      ->add_option("--travel-height", arguments->travel_height_mm,
+      ->add_option("--travel-height-mm", arguments->travel_height_mm,
                    "height of the paths above the axis of the bar and the faces of the gauge, mm")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

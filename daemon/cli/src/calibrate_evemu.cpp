@@ -23,7 +23,7 @@ namespace {
 
 struct CalibrateEvemuArguments {
   FollowOptions follow;
-  std::string calibrator, reference;
+  std::string calibrator, rotation_reference;
   double u_reference_um = 1.0;
   std::size_t points_per_ball = 0, points_per_block = 0;  // 0: from the daemon's configuration
 };
@@ -32,8 +32,8 @@ Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   ABBE_TRY(calibrator);
   std::optional<BallErrorsFile> reference;
-  if (!arguments.reference.empty()) {
-    auto read = read_errors_csv(arguments.reference);
+  if (!arguments.rotation_reference.empty()) {
+    auto read = read_errors_csv(arguments.rotation_reference);
     ABBE_TRY(read);
     reference = std::move(*read);
   }
@@ -65,7 +65,7 @@ void add_calibrate_evemu(CLI::App& parent, int& exit) {
       "--cancel ends the calibration.");
   auto* calibrator = command->add_option("--calibrator", arguments->calibrator, "calibrator.toml");
   auto* reference = command->add_option(
-      "--rotation-reference", arguments->reference,
+      "--rotation-reference", arguments->rotation_reference,
       "errors.csv of points where V is known independently: the model is rotated to fit them");
   command
       ->add_option("--u-reference-um", arguments->u_reference_um, "standard uncertainty of that V")

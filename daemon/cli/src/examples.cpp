@@ -22,17 +22,17 @@ constexpr std::array kExamples{
     Example{"calibrate otf", "--path path.csv"},
     Example{"calibrate evemu", "--calibrator calibrator.toml"},
     Example{"calibrate probe", "--recording run.mcap"},
-    Example{"calibrate artefact", "--calibrator nominal.toml --at 100,50,20 -o calibrator.toml"},
+    Example{"calibrate artefact", "--calibrator nominal.toml --at-mm 100,50,20 -o calibrator.toml"},
     Example{"calibrate bar", "--bar nominal.toml --plan plan.toml --gauge gauge.toml -o bar.toml"},
-    Example{"plan", "otf --machine machine.toml --tracker-at=-750,-620,-350 -o plan"},
+    Example{"plan", "otf --machine machine.toml --tracker-at-mm=-750,-620,-350 -o plan"},
     Example{"plan otf",
-            "-c abbed.toml --tracker-at=-750,-620,-350 --tracker-at=900,-600,-300\n"
-            "           --budget 15 --feed 2500 --dialect linuxcnc -o plan"},
-    Example{
-        "plan mfb",
-        "-c machine.toml --bar bar.toml --stylus=0,0,-150 --stylus=100,0,-150 \\\n"
-        "           --stylus=-100,0,-150 --stylus=0,100,-150 --stylus=0,-100,-150 -o plan.toml\n"
-        "         abbe plan mfb -c machine.toml --bar bar.toml --check plan.toml"},
+            "-c abbed.toml --tracker-at-mm=-750,-620,-350 --tracker-at-mm=900,-600,-300\n"
+            "           --budget-min 15 --feed-mm-per-min 2500 --dialect linuxcnc -o plan"},
+    Example{"plan mfb",
+            "-c machine.toml --bar bar.toml --stylus-mm=0,0,-150 --stylus-mm=100,0,-150 \\\n"
+            "           --stylus-mm=-100,0,-150 --stylus-mm=0,100,-150 --stylus-mm=0,-100,-150 \\\n"
+            "           -o plan.toml\n"
+            "         abbe plan mfb -c machine.toml --bar bar.toml --check plan.toml"},
     Example{"reference", "--here --axis X"},
     Example{"sensors", "accept scale_x --why \"compared with a thermometer\""},
     Example{"sensors accept", "scale_x --why \"compared with a thermometer\""},

@@ -45,12 +45,12 @@ void add_export(CLI::App& parent, int& exit) {
                    "file; for linuxcnc-comp and heidenhain-com a folder, with the report in "
                    "export.txt")
       ->required();
-  command->add_option("--tool", arguments->tool,
+  command->add_option("--tool-mm", arguments->tool,
                       "x,y,z: tool offset in mm; default: that of the calibration");
-  command->add_option("--step", arguments->step_mm,
+  command->add_option("--step-mm", arguments->step_mm,
                       "largest distance of nodes in mm; default: the nodes of linear tables, 32 "
                       "equal steps of other models");
-  command->add_option("--volume", arguments->volume,
+  command->add_option("--volume-mm", arguments->volume,
                       "xmin,xmax,ymin,ymax,zmin,zmax in mm: a part of the volume; default: the box "
                       "around the validity volume");
   command->add_option("--axis-map", arguments->axis_map,

@@ -217,7 +217,7 @@ void add_options(CLI::App& command, IdentifyEvemuCommand& arguments) {
                 "the directions of the errors do not come from the artefact's blocks")
       ->needs(errors);
   command.add_option(
-      "--rotation-reference", input.reference,
+      "--rotation-reference", input.rotation_reference,
       "errors.csv of points where V is known independently: the model is rotated to fit them");
   command
       .add_option("--u-reference-um", input.u_reference_um,

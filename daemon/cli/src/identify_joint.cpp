@@ -16,6 +16,7 @@
 #include "abbe/tasks/joint_report.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
+#include "option_spelling.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 
@@ -99,8 +100,9 @@ void add_joint_options(CLI::App& command, IdentifyJointCommand& arguments) {
       ->required();
   command
       .add_option("--estimator", arguments.estimator,
-                  "of the runs: two-step or joint; default: that of [otf], or joint")
-      ->check(CLI::IsMember({"two-step", "joint"}));
+                  "of the runs: two-step or simultaneous; default: that of [otf], or simultaneous")
+      ->transform(estimator_word, "")
+      ->check(CLI::IsMember({"two-step", "simultaneous"}));
   command
       .add_option("--u-scale-ppm", arguments.u_scale_ppm,
                   "relative standard uncertainty common to all ranges of one tracker, ppm;\n"

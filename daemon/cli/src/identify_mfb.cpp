@@ -15,6 +15,7 @@
 #include "commands.hpp"
 #include "identified_model.hpp"
 #include "mfb_summary.hpp"
+#include "option_spelling.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 
@@ -71,11 +72,13 @@ void add_options(CLI::App& command, IdentifyMfbCommand& arguments) {
                         ->excludes(bar)
                         ->excludes(plan);
   command
-      .add_option("--estimator", arguments.estimator,
-                  "joint: one weighted least-squares adjustment of all touches; sequential: as\n"
-                  "published, angles, then translations, then squareness; without the roll slope\n"
-                  "of X")
-      ->check(CLI::IsMember({"joint", "sequential"}))
+      .add_option(
+          "--estimator", arguments.estimator,
+          "simultaneous: one weighted least-squares adjustment of all touches; sequential: as\n"
+          "published, angles, then translations, then squareness; without the roll slope\n"
+          "of X")
+      ->transform(estimator_word, "")
+      ->check(CLI::IsMember({"simultaneous", "sequential"}))
       ->capture_default_str();
   auto* trials = command
                      .add_option("--monte-carlo", arguments.trials,

@@ -15,6 +15,7 @@
 #include "backlash_lines.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
+#include "option_spelling.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 #include "tracker_drift_lines.hpp"
@@ -54,8 +55,8 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfCommand& arguments) 
       {"tables", calib::name(*outcome.document.model.interpolation())},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
-      {"blocks", outcome.blocks},
-      {"blocks_used", outcome.blocks_used},
+      {"segments", outcome.segments},
+      {"segments_used", outcome.segments_used},
       {"observations", s.observations},
       {"unknowns", s.unknowns},
       {"rank", s.rank},
@@ -93,7 +94,7 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfCommand& argument
              calib::name(*outcome.document.model.interpolation()), outcome.document.machine);
   const bool stands = outcome.document.mode == otf::name(otf::Mode::Standstill);
   fmt::print("samples     {}, {} lost; {} of {} {} used\n", s.samples, s.lost_samples,
-             outcome.blocks_used, outcome.blocks, stands ? "standstills" : "blocks");
+             outcome.segments_used, outcome.segments, stands ? "standstills" : "segments");
   fmt::print(
       "solution    {}: {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
       outcome.document.estimator, s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
@@ -190,7 +191,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                         "(two signs\nreversed); as [gate] accept = [\"path-orientation\"]");
   recording->excludes(centre)->excludes(u_scale)->excludes(corrected)->excludes(orientation);
   auto* targets = command->add_option(
-      "--target", arguments->targets,
+      "--target-mm", arguments->targets,
       "instead of --tracker, three times or more: X,Y,Z=FILE, target offset in mm and tracker.csv "
       "of\na run of the path with it. Offsets that are not on a line give all 18 tables, valid for "
       "any\ntool; the tracker may stand elsewhere in each run (position_mm of the tracker is that "
@@ -213,10 +214,11 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   recording->excludes(path)->excludes(tracker)->excludes(encoder)->excludes(mode);
   command
       ->add_option("--estimator", arguments->estimator,
-                   "joint: alignment and errors together, by Gauss-Newton;\n"
+                   "simultaneous: alignment and errors together, by Gauss-Newton;\n"
                    "two-step: align, then adjust, as published;\n"
-                   "default: that of [otf], or joint")
-      ->check(CLI::IsMember({"two-step", "joint"}));
+                   "default: that of [otf], or simultaneous")
+      ->transform(estimator_word, "")
+      ->check(CLI::IsMember({"two-step", "simultaneous"}));
   command
       ->add_option("--tables", arguments->tables,
                    "interpolation of the tables between their nodes: linear, or for smooth errors\n"
@@ -229,14 +231,15 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                  "mean of both directions; default: [otf] backlash, or none")
       ->check(CLI::IsMember({"none", "per-table", "forward-backward"}));
   command->add_option(
-      "--smoothness", arguments->smoothness,
+      "--smoothness-um", arguments->smoothness,
       "prior for smooth tables: none; or UM or X,Y,Z: standard deviation, in um, of the bend of\n"
       "a table over three nodes 50 mm apart (second difference; twice as many urad for angles).\n"
       "Tables rougher than the prior are named and computed without it; default: that of [otf], or "
       "none");
   command
-      ->add_option("--block-samples", arguments->block_samples,
-                   "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")
+      ->add_option(
+          "--segment-samples", arguments->segment_samples,
+          "samples averaged in a segment (on-the-fly); default: segments of 8.3 mm of travel")
       ->check(CLI::Range(1, 1000));
   add_result_options(*command, arguments->keep, arguments->json, arguments->out);
 

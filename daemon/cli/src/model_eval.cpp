@@ -114,7 +114,7 @@ void add_model_eval(CLI::App& parent, int& exit) {
       parent.add_subcommand("eval",
                             "Print the volumetric error at given axis positions as CSV to stdout.\n"
                             "e = actual - nominal at the scale reading; u: its standard "
-                            "uncertainty (k = 1) in the model's gauge;\n"
+                            "uncertainty (k = 1) in the model's datum;\n"
                             "inside: 1 if the position is in the validity volume of the model.");
   command->add_option("MODEL", arguments->model, kModelText)->required();
   add_store_options(*command, arguments->store);
@@ -123,7 +123,7 @@ void add_model_eval(CLI::App& parent, int& exit) {
                    "points.csv: x_mm,y_mm,z_mm, scale readings; dx,dy,dz (+, -, 0), if given: "
                    "direction of travel")
       ->required();
-  command->add_option("--tool", arguments->tool,
+  command->add_option("--tool-mm", arguments->tool,
                       "x,y,z: tool offset in mm; default: that of the calibration");
   command->add_option("--direction", arguments->direction,
                       "direction in which X, Y and Z last moved, such as +,-,0 (0: not known), for "

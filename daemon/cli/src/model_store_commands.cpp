@@ -96,10 +96,10 @@ void print_entry(const StoreEntry& entry) {
 
 void print_model(const ModelDocument& document) {
   const auto& s = document.statistics;
-  fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, gauge {}\n",
+  fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, datum {}\n",
              to_text(document.created), printable_line(document.machine),
              document.model.chain().text(), document.method, document.estimator,
-             name(document.model.gauge()));
+             name(document.model.datum()));
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,

@@ -108,7 +108,7 @@ Error not_seen(const BarPlan& plan, const PlanInputs& inputs) {
   if (!plan.missing.empty())
     error.details.emplace_back(
         "the stem of a stylus is along the ram, the last axis of the chain, or across it if the "
-        "tip is beside it; state another one: --stylus=x,y,z,-x");
+        "tip is beside it; state another one: --stylus-mm=x,y,z,-x");
   for (const auto axis : calib::kAllAxes)
     for (auto& reason : reasons_of_axis(plan, inputs, axis))
       error.details.push_back(std::move(reason));
@@ -144,7 +144,7 @@ int run(const PlanMfbCommand& arguments) {
 std::vector<CLI::Option*> add_set_options(CLI::App& command, PlanMfbCommand& arguments) {
   return {
       command
-          .add_option("--stylus", arguments.styli,
+          .add_option("--stylus-mm", arguments.styli,
                       "x,y,z: tool reference point to tip, machine axes, mm; once for each\n"
                       "stylus. The stem is across the ram if the tip is 20 mm beside it, else\n"
                       "along it; x,y,z,-x states it")
@@ -161,7 +161,7 @@ std::vector<CLI::Option*> add_set_options(CLI::App& command, PlanMfbCommand& arg
                        "as many positions and measurements; takes up to a minute"),
       command.add_option("--exchanges", arguments.exchanges, "with --best: at most this many")
           ->check(CLI::Range(0, 1000)),
-      command.add_option("--rotary-at", arguments.rotary_at,
+      command.add_option("--rotary-at-mm", arguments.rotary_at,
                          "with --set indexed: x,y,z where the rotary axes cross, as a place of\n"
                          "the tip, mm; default: the middle of the travel"),
       command
@@ -211,14 +211,14 @@ void add_plan_mfb(CLI::App& parent, int& exit) {
   for (auto* option : add_noise_options(*command, *arguments)) planning.push_back(option);
   planning.push_back(command->add_option("-o,--out", arguments->out, "the plan.toml to write"));
   for (auto* option : planning)
-    if (option->get_expected_max() > 0 && option->get_name() != "--stylus" &&
-        option->get_name() != "--rotary-at" && option->get_name() != "--out")
+    if (option->get_expected_max() > 0 && option->get_name() != "--stylus-mm" &&
+        option->get_name() != "--rotary-at-mm" && option->get_name() != "--out")
       option->capture_default_str();
   auto* check = command->add_option("--check", arguments->check,
                                     "plan.toml: judge this plan instead of making one");
   for (auto* option : planning) check->excludes(option);
   command
-      ->add_option("--feed,--feed-mm-per-min", arguments->feed_mm_per_min,
+      ->add_option("--feed-mm-per-min", arguments->feed_mm_per_min,
                    "between touches, mm/min, for the duration")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
@@ -232,8 +232,8 @@ void add_plan_mfb(CLI::App& parent, int& exit) {
   command->callback([arguments, &exit] {
     exit = arguments->check.empty() && arguments->styli.empty()
                ? report({ErrorCode::Usage,
-                         "plan mfb needs the styli, for example --stylus=0,0,-150 "
-                         "--stylus=100,0,-150 --stylus=-100,0,-150, or --check plan.toml"})
+                         "plan mfb needs the styli, for example --stylus-mm=0,0,-150 "
+                         "--stylus-mm=100,0,-150 --stylus-mm=-100,0,-150, or --check plan.toml"})
                : run(*arguments);
   });
 }

@@ -111,7 +111,7 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
   else
     fmt::print("base path   {}\n", plan.base.error().text);
 
-  fmt::print("rank        {} of {} unknowns, {} fixed by the gauge\n", plan.prediction.rank,
+  fmt::print("rank        {} of {} unknowns, {} fixed by the datum\n", plan.prediction.rank,
              plan.prediction.unknowns, plan.prediction.datum_defect);
   fmt::print("no table    {} (one target does not show them)\n",
              fmt::join(plan.prediction.left_out, ", "));
@@ -156,7 +156,7 @@ void add_machine_options(CLI::App& command, PlanOtfCommand& arguments) {
   auto* chain = command.add_option("--chain", arguments.chain, "with --travel-mm: kinematic chain")
                     ->capture_default_str();
   auto* tool = command
-                   .add_option("--tool", arguments.tool,
+                   .add_option("--tool-mm", arguments.tool,
                                "with --travel-mm: x,y,z, centre of the reflector relative to "
                                "the tool reference point, mm")
                    ->capture_default_str();
@@ -170,8 +170,7 @@ void add_machine_options(CLI::App& command, PlanOtfCommand& arguments) {
 }
 
 void add_drive_options(CLI::App& command, PlanOtfCommand& arguments) {
-  command
-      .add_option("--feed,--feed-mm-per-min", arguments.feed_mm_per_min, "feed on each leg, mm/min")
+  command.add_option("--feed-mm-per-min", arguments.feed_mm_per_min, "feed on each leg, mm/min")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
@@ -202,18 +201,17 @@ void add_plan_otf(CLI::App& parent, int& exit) {
   add_machine_options(*command, *arguments);
   command
       ->add_option(
-          "--tracker-at", arguments->trackers,
+          "--tracker-at-mm", arguments->trackers,
           "x,y,z: centre of the tracker, machine coordinates, mm; several times: they are\n"
           "compared, and the best one is used; default: [tracker] position_mm")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   auto* length = command
-                     ->add_option("--length,--length-m", arguments->length_m,
+                     ->add_option("--length-m", arguments->length_m,
                                   "longest path, m; default: the length of the base path")
                      ->check(CLI::PositiveNumber);
-  auto* budget =
-      command->add_option("--budget,--budget-min", arguments->budget_min, "longest duration, min")
-          ->check(CLI::PositiveNumber);
+  auto* budget = command->add_option("--budget-min", arguments->budget_min, "longest duration, min")
+                     ->check(CLI::PositiveNumber);
   add_drive_options(*command, *arguments);
   command
       ->add_option("--lattice", arguments->lattice,

@@ -30,7 +30,7 @@ struct ReferenceArguments {
   bool cancel = false;
   bool here = false;
   std::vector<std::string> axes;
-  double u_um = 1e6 * SetDatumHere::kByEye;
+  double u_um = 1e6 * SetZeroHere::kByEye;
   bool json = false;
 };
 

@@ -55,7 +55,7 @@ void print_report(const ReplayedRecording& replayed) {
     }
   }
 
-  for (const auto& d : r.datums) {
+  for (const auto& d : r.zeros) {
     fmt::print("reference    {}: count 0 is at {:.6f} mm live, {} from the marks in the bytes\n",
                d.axis, 1e3 * d.live,
                d.again ? fmt::format("{:.6f} mm", 1e3 * *d.again) : "not found");

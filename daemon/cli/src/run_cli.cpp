@@ -20,6 +20,7 @@
 #include "dds_keys.hpp"
 #include "examples.hpp"
 #include "known_commands.hpp"
+#include "option_spelling.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -139,7 +140,8 @@ int parse_and_run(const std::vector<std::string>& words) {
 
   try {
     // CLI11 takes the words in reverse order.
-    app.parse(std::vector<std::string>{words.rbegin(), words.rend()});
+    const auto whole = present_names(words, app);
+    app.parse(std::vector<std::string>{whole.rbegin(), whole.rend()});
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {

@@ -239,7 +239,7 @@ void add_options(CLI::App& command, VerifyCommand& arguments) {
           "fit: fit the tracker's frame to the readings; machine: its axes are the machine's axes")
       ->check(CLI::IsMember({"fit", "machine"}))
       ->capture_default_str();
-  command.add_option("--tool", arguments.tool,
+  command.add_option("--tool-mm", arguments.tool,
                      "x,y,z: tool offset in mm; default: that of the calibration");
   command.add_option(
       "--origin-mm", arguments.origin,

@@ -27,7 +27,7 @@ constexpr Pairs<OtfMode, calib::otf::Mode, 2> kModes{
      {OtfMode::Standstill, calib::otf::Mode::Standstill}}};
 constexpr Pairs<OtfEstimator, calib::otf::Estimator, 2> kEstimators{
     {{OtfEstimator::TwoStep, calib::otf::Estimator::TwoStep},
-     {OtfEstimator::Joint, calib::otf::Estimator::Joint}}};
+     {OtfEstimator::Simultaneous, calib::otf::Estimator::Simultaneous}}};
 constexpr Pairs<OtfBacklash, calib::TravelDependence, 3> kBacklash{
     {{OtfBacklash::None, calib::TravelDependence::None},
      {OtfBacklash::PerTable, calib::TravelDependence::Backlash},

@@ -44,7 +44,8 @@ void read_otf(ClassifiedSection& root, OtfConfig& out) {
   section.get("u_repeatability_um", out.u_repeatability_m, kMicro, {0.0, 1000.0});
   section.get_word<OtfEstimator>(
       "estimator", out.estimator,
-      {{"two-step", OtfEstimator::TwoStep}, {"joint", OtfEstimator::Joint}});
+      {{"two-step", OtfEstimator::TwoStep}, {"simultaneous", OtfEstimator::Simultaneous}},
+      Need::Optional, {{"joint", OtfEstimator::Simultaneous}});
   section.get_word<OtfBacklash>("backlash", out.backlash,
                                 {{"none", OtfBacklash::None},
                                  {"per-table", OtfBacklash::PerTable},

@@ -46,7 +46,7 @@ constexpr int kDone = number(ExitCode::Done), kNoAnswer = number(ExitCode::DataI
 std::string footer() {
   return "Examples:\n"
          "  abbe watch -c /etc/abbe/abbed.toml\n"
-         "  abbe watch --domain 7 --machine mill --grid-csv grid.csv --timeout 60\n" +
+         "  abbe watch --domain 7 --machine mill --grid-csv grid.csv --timeout-s 60\n" +
          daemon::exit_codes_text(
              {{ExitCode::Done},
               {ExitCode::DataInsufficient,
@@ -263,7 +263,7 @@ int main(int argc, char** argv) {
   app.add_flag("--json", options.show.json, "print one line with a JSON object per sample");
   app.add_flag("--until-model", options.until_model,
                "exit with code 0 as soon as a model that may be applied has arrived");
-  app.add_option("--timeout", options.timeout_s,
+  app.add_option("--timeout-s", options.timeout_s,
                  "exit after this many seconds; exit code 1 if a model was awaited");
   app.add_option("--grid-csv", options.grid_csv,
                  "wait for a model that may be applied and write its grid to this file: "

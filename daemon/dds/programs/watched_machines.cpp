@@ -347,7 +347,7 @@ void WatchedMachines::show_state(const std::string& name, Machine& machine,
 void WatchedMachines::show_model(Machine& machine, const Publisher& publisher) {
   const auto& m = publisher.model.model();
   if (!m || std::exchange(machine.shown_model, m->model_id()) == m->model_id()) return;
-  print(fmt::format("{}  received model {}: {} {}, gauge {}, {} parameters, chain {}", m->machine(),
+  print(fmt::format("{}  received model {}: {} {}, datum {}, {} parameters, chain {}", m->machine(),
                     m->model_id(), m->method(), m->estimator(), m->gauge(), m->parameters().size(),
                     m->chain()));
 }

@@ -73,7 +73,7 @@ Json fields(const v1::ErrorModel& m) {
           FIELD(model_id),
           FIELD(method),
           FIELD(estimator),
-          FIELD(gauge),
+          FIELD(datum),
           FIELD(chain),
           FIELD(basis),
           FIELD(squareness),

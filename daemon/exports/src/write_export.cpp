@@ -53,7 +53,7 @@ Result<void> check_nodes(const FormatFacts& facts, const calib::GridAxes& nodes_
     if (facts.most_nodes != 0 && count > facts.most_nodes)
       return fail(ErrorCode::Usage,
                   fmt::format("{}: {} nodes on axis {}; the control takes at most {}: give a "
-                              "larger --step",
+                              "larger --step-mm",
                               facts.name, count, calib::letter(axis), facts.most_nodes));
   }
   return {};

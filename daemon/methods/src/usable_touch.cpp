@@ -6,7 +6,7 @@
 
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/linear_axes.hpp"
-#include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 
 namespace abbe::daemon {
 

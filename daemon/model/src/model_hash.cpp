@@ -59,7 +59,7 @@ void add_frame(Canonical& out, const calib::VolumetricModel& model) {
     out.vector(polynomials->ball1_m());
   }
 
-  out.text(name(model.gauge()));
+  out.text(name(model.datum()));
   out.vectors(model.tool_offsets_m());
 }
 

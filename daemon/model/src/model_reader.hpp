@@ -43,6 +43,9 @@ class ModelReader {
     fault(path.empty() ? key : path + "." + key, "missing");
     return nullptr;
   }
+  [[nodiscard]] bool has(const std::string& key) const {
+    return root_.is_object() && root_.contains(key);
+  }
   std::string text(const std::string& key) { return text_of(root_, "", key); }
   std::string text_of(const ModelJson& in, const std::string& path, const std::string& key) {
     const ModelJson* value = find(in, path, key);

@@ -113,15 +113,16 @@ void read_covariance(ModelReader& in, calib::ModelDescription& out) {
     for (Eigen::Index j = i; j < n; ++j) out.covariance(i, j) = out.covariance(j, i) = values[k++];
 }
 
-void read_gauge(ModelReader& in, calib::ModelDescription& out) {
-  const auto text = in.text("gauge");
-  for (const auto gauge :
-       {calib::Gauge::G1, calib::Gauge::G2, calib::Gauge::Ball1Blocks, calib::Gauge::Ball1})
-    if (text == name(gauge)) {
-      out.gauge = gauge;
+void read_datum(ModelReader& in, calib::ModelDescription& out) {
+  // "gauge": the earlier name
+  const auto text = in.text(in.has("gauge") ? "gauge" : "datum");
+  for (const auto datum : {calib::ModelDatum::G1, calib::ModelDatum::G2,
+                           calib::ModelDatum::Ball1Blocks, calib::ModelDatum::Ball1})
+    if (text == name(datum)) {
+      out.datum = datum;
       return;
     }
-  in.fault("gauge", "must be \"G1\", \"G2\", \"Ball1-blocks\" or \"Ball1\"");
+  in.fault("datum", "must be \"G1\", \"G2\", \"Ball1-blocks\" or \"Ball1\"");
 }
 
 calib::ModelDescription read_description(ModelReader& in) {
@@ -131,7 +132,7 @@ calib::ModelDescription read_description(ModelReader& in) {
     out.chain = *chain;
   else
     in.fault("chain", chain.error().text);
-  read_gauge(in, out);
+  read_datum(in, out);
   if (in.text("squareness") != "travel") in.fault("squareness", "must be \"travel\"");
   out.tool_offsets_m = in.vectors(in.find(in.root(), "", "tool_offsets_mm"), "tool_offsets_mm");
   read_basis(in, out);

@@ -387,7 +387,7 @@ std::string to_json(const ModelDocument& document) {
   }
   if (document.configuration) write_configuration(out, document);
   out.member("chain", model.chain().text());
-  out.member("gauge", name(model.gauge()));
+  out.member("datum", name(model.datum()));
   out.member("squareness", "travel");
   out.key("tool_offsets_mm");
   out.raw(vectors_mm(model.tool_offsets_m()));

@@ -46,22 +46,22 @@ json json_of(const AxisMarks& marks) {
           {"reversed", marks.reversed}};
 }
 
-json json_of(const FoundDatum& datum) {
-  return {{"axis", datum.axis},
-          {"reading_at_zero", datum.reading_at_zero},
-          {"u", datum.u},
-          {"stated", datum.stated}};
+json json_of(const FoundZero& zero) {
+  return {{"axis", zero.axis},
+          {"reading_at_zero", zero.reading_at_zero},
+          {"u", zero.u},
+          {"stated", zero.stated}};
 }
 
-FoundDatum datum_from(const json& content) {
-  return FoundDatum{.axis = content.at("axis").get<std::size_t>(),
-                    .reading_at_zero = content.at("reading_at_zero").get<double>(),
-                    .u = content.at("u").get<double>(),
-                    .stated = content.at("stated").get<bool>()};
+FoundZero zero_from(const json& content) {
+  return FoundZero{.axis = content.at("axis").get<std::size_t>(),
+                   .reading_at_zero = content.at("reading_at_zero").get<double>(),
+                   .u = content.at("u").get<double>(),
+                   .stated = content.at("stated").get<bool>()};
 }
 
 /// The state in the JSON text. nullopt if it has more axes than a sample can have, or an invalid
-/// datum. Throws json::exception if a member is missing or has the wrong type.
+/// zero. Throws json::exception if a member is missing or has the wrong type.
 std::optional<CountingState> state_from(const json& content) {
   CountingState state;
   state.boot_id = content.at("boot_id").get<std::string>();
@@ -77,9 +77,9 @@ std::optional<CountingState> state_from(const json& content) {
   std::ranges::copy(counts, progress.count.begin());
 
   for (const auto& found : content.at("datum")) {
-    const auto& datum = state.counting.datum.emplace_back(datum_from(found));
-    if (datum.axis >= counts.size() || !std::isfinite(datum.reading_at_zero) ||
-        !std::isfinite(datum.u))
+    const auto& zero = state.counting.zero.emplace_back(zero_from(found));
+    if (zero.axis >= counts.size() || !std::isfinite(zero.reading_at_zero) ||
+        !std::isfinite(zero.u))
       return std::nullopt;
   }
 
@@ -88,8 +88,8 @@ std::optional<CountingState> state_from(const json& content) {
 
 json json_of(const CountingState& state) {
   const auto& progress = state.counting.progress;
-  json datum = json::array();
-  for (const auto& found : state.counting.datum) datum.push_back(json_of(found));
+  json zero = json::array();
+  for (const auto& found : state.counting.zero) zero.push_back(json_of(found));
   return {{"boot_id", state.boot_id},
           {"set_up", state.set_up},
           {"serial_number", progress.serial_number()},
@@ -97,7 +97,7 @@ json json_of(const CountingState& state) {
           {"clock_count", progress.clock_count},
           {"counts", std::vector<std::int64_t>(progress.count.begin(),
                                                progress.count.begin() + progress.axis_count)},
-          {"datum", std::move(datum)}};
+          {"datum", std::move(zero)}};
 }
 
 /// Names of the members in which two set-ups differ.

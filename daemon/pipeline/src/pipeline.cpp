@@ -4,12 +4,12 @@
 
 namespace abbe::daemon {
 
-Pipeline::Pipeline(AssemblerOptions options, Datum* datum)
-    : datum_(datum), assembler_(std::move(options)) {}
+Pipeline::Pipeline(AssemblerOptions options, AxisZeros* zeros)
+    : zeros_(zeros), assembler_(std::move(options)) {}
 
 void Pipeline::cycle(Batch& batch) {
   for (PipelineObserver* const observer : observers_) observer->on_delivered(batch);
-  if (datum_ != nullptr) datum_->apply(batch);
+  if (zeros_ != nullptr) zeros_->apply(batch);
   for (PipelineObserver* const observer : observers_) observer->on_samples(batch);
 
   assembler_.take(batch);

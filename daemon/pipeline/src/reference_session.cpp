@@ -15,7 +15,7 @@ using protocol::SampleFlag;
 // card arrive late.
 constexpr auto kMemory = std::chrono::seconds{2};
 // Largest spread of the zero as determined from the single marks, in signal periods. With a larger
-// spread the scale signals are taken to be faulty, and no datum is given.
+// spread the scale signals are taken to be faulty, and no zero is given.
 constexpr double kMostSpreadPeriods = 0.5;
 
 /// Smallest and largest live count of the samples around [from, to].
@@ -50,7 +50,7 @@ bool ReferenceSession::finished() const {
 void ReferenceSession::restart(Axis& axis) {
   axis.traverse.reset();
   axis.alignment = {};
-  axis.datum.reset();
+  axis.zero.reset();
   axis.result.state = AxisReference::State::Searching;
 }
 
@@ -113,7 +113,7 @@ void ReferenceSession::cross(Axis& axis, const drivers::MarkCrossing& crossing) 
   }
 
   const auto outcome = axis.traverse.on_mark(crossing.count);
-  if (outcome && *outcome) axis.datum = **outcome;
+  if (outcome && *outcome) axis.zero = **outcome;
   if (outcome && !*outcome) {
     axis.result.reason = axis.options.name + ": " + std::string(name(outcome->error()));
     if (outcome->error() == drivers::MarkFault::WrongScale)
@@ -125,19 +125,19 @@ void ReferenceSession::cross(Axis& axis, const drivers::MarkCrossing& crossing) 
 }
 
 void ReferenceSession::conclude(Axis& axis) {
-  if (axis.result.state != AxisReference::State::Searching || !axis.datum) return;
+  if (axis.result.state != AxisReference::State::Searching || !axis.zero) return;
   if (axis.alignment.half_width() > axis.options.max_half_width_counts) {
     axis.result.reason =
         axis.options.name + ": the marks agree; drive slowly over more marks to align the cards";
     return;
   }
 
-  if (axis.datum->spread_periods > kMostSpreadPeriods) return;
+  if (axis.zero->spread_periods > kMostSpreadPeriods) return;
   const double per_period = axis.options.marks.counts_per_period;
   const double offset_periods =
-      *axis.alignment.difference() / per_period + axis.datum->offset_periods;
+      *axis.alignment.difference() / per_period + axis.zero->offset_periods;
   const double u_periods = std::hypot(axis.alignment.half_width() / per_period / std::sqrt(3.0),
-                                      axis.datum->spread_periods / std::sqrt(12.0));
+                                      axis.zero->spread_periods / std::sqrt(12.0));
   axis.result.state = AxisReference::State::Found;
   axis.result.offset = axis.options.period * offset_periods;
   axis.result.u_offset = axis.options.period * u_periods;

@@ -108,7 +108,7 @@ v1::ErrorModel model_message(const PublishedModel& active, const Stamp& stamp) {
   m.model_id(active.id);
   m.method(active.method);
   m.estimator(active.estimator);
-  m.gauge(std::string{calib::name(active.model.gauge())});
+  m.gauge(std::string{calib::name(active.model.datum())});
   m.chain(active.model.chain().text());
   const auto interpolation = active.model.interpolation();
   m.basis(interpolation ? std::string{calib::name(*interpolation)} : "legendre");

@@ -119,7 +119,7 @@ void Recorder::record(const protocol::AxisSample& sample, std::string_view devic
   recording::fill(state_->axis_sample, sample, device);
   state_->add_marked(Stream::AxisSample, State::dates_of(sample.head.time, taken), device,
                      state_->axis_sample);
-  state_->axes_known = DatumState{.at = sample.head.time, .unknown = sample.missing_mask};
+  state_->axes_known = ZeroState{.at = sample.head.time, .unknown = sample.missing_mask};
 }
 
 void Recorder::record(const protocol::ProbeTrigger& touch, std::string_view device, Taken taken) {

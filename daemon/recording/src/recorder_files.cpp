@@ -85,7 +85,7 @@ IoResult Recorder::State::begin_file() {
 
   forget_finished_requests();
   if (part > 0 && axes_known)
-    recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
+    recording::carry_zeros_on(attachments, *axes_known, utc_ns(axes_known->at));
   if (part > 0) carry_sensors_on();
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
   ABBE_TRY(fresh);

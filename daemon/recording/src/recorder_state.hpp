@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/protocol/mcap/writer.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "abbe/recording/recorder.hpp"
-#include "carried_datum.hpp"
 #include "carried_environment.hpp"
+#include "carried_zero.hpp"
 #include "file_front.hpp"
 #include "loss_ledger.hpp"
 #include "recording_file.hpp"
@@ -101,7 +101,7 @@ struct Recorder::State {
   /// number of repeated environment messages in the open chunk. They are also in an earlier file,
   /// and do not count as lost with the chunk.
   std::uint64_t carried_in_chunk = 0;
-  std::optional<DatumState> axes_known;  ///< from the last axis sample
+  std::optional<ZeroState> axes_known;  ///< from the last axis sample
   recording::CarriedEnvironment environment_to_carry;
   protocol::HostTime cycle{};  ///< of the last message
   RecorderStatus status;

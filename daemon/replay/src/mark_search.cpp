@@ -1,7 +1,7 @@
 #include "mark_search.hpp"
 
 #include "abbe/config/capabilities.hpp"
-#include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/pipeline/reference_session.hpp"
 #include "abbe/result/try.hpp"
 
@@ -13,8 +13,8 @@ namespace {
 
 HostTime began_after(const RecordingReader& recording) {
   for (const auto& attachment : recording.attachments())
-    if (attachment.name == kDatumStateName)
-      if (const auto state = datum_state_from_attachment(attachment)) return state->at;
+    if (attachment.name == kZeroStateName)
+      if (const auto state = zero_state_from_attachment(attachment)) return state->at;
   return HostTime::min();
 }
 
@@ -65,21 +65,21 @@ void MarkSearch::note(std::size_t i) {
   axes_[i].found = found;
 }
 
-std::vector<ReplayedDatum> MarkSearch::compared(const RecordingReader& recording) const {
-  std::vector<ReplayedDatum> all;
+std::vector<ReplayedZero> MarkSearch::compared(const RecordingReader& recording) const {
+  std::vector<ReplayedZero> all;
   std::vector<std::size_t> seen(axes_.size(), 0);
   const HostTime begun = began_after(recording);
 
   for (const auto& attachment : recording.attachments()) {
-    if (attachment.name != kDatumName) continue;
-    const auto live = datum_from_attachment(attachment);
+    if (attachment.name != kZeroName) continue;
+    const auto live = zero_from_attachment(attachment);
     if (live && live->from < begun) continue;  // found in an earlier file
     for (std::size_t i = 0; live && i < axes_.size(); ++i) {
       if (options_.axes[i].live_axis != live->axis) continue;
-      ReplayedDatum& datum = all.emplace_back();
-      datum.axis = options_.axes[i].name;
-      datum.live = live->reading_at_zero;
-      if (seen[i] < axes_[i].readings.size()) datum.again = axes_[i].readings[seen[i]++];
+      ReplayedZero& zero = all.emplace_back();
+      zero.axis = options_.axes[i].name;
+      zero.live = live->reading_at_zero;
+      if (seen[i] < axes_[i].readings.size()) zero.again = axes_[i].readings[seen[i]++];
     }
   }
 

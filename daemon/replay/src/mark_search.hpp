@@ -20,12 +20,12 @@ class MarkSearch {
   [[nodiscard]] static Result<MarkSearch> of(const RecordingReader& recording,
                                              const Config& config);
 
-  /// Call it before the datum is applied to the samples, because the search uses them as the
+  /// Call it before the zero is applied to the samples, because the search uses them as the
   /// devices delivered them.
   void take(const Batch& batch);
 
-  /// The datums that the live run found, in their order, each with the value that the replay found.
-  [[nodiscard]] std::vector<ReplayedDatum> compared(const RecordingReader& recording) const;
+  /// The zeros that the live run found, in their order, each with the value that the replay found.
+  [[nodiscard]] std::vector<ReplayedZero> compared(const RecordingReader& recording) const;
 
  private:
   struct Axis {

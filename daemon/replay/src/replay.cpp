@@ -15,8 +15,8 @@
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/pipeline/counting_state.hpp"
-#include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/pipeline.hpp"
 #include "abbe/recording/recorded_clock.hpp"
 #include "abbe/result/try.hpp"
@@ -135,27 +135,28 @@ bool has_rule(const RecordingReader& recording, const char* name) {
   return versions != recording.metadata().end() && versions->second.contains(name);
 }
 
-/// The datum of each axis as found in the live run. It is taken from attachments even in a replay
-/// from raw bytes, because these do not show from which time a datum applies.
-Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
-  const bool asked = has_rule(recording, kDatumRule);
-  Datum datum{config, asked ? Datum::WithoutMarks::NeedAZero : Datum::WithoutMarks::Untouched};
+/// The zero of each axis as found in the live run. It is taken from attachments even in a replay
+/// from raw bytes, because these do not show from which time a zero applies.
+Result<AxisZeros> zero_of(const RecordingReader& recording, const Config& config) {
+  const bool asked = has_rule(recording, kZeroRule);
+  AxisZeros zero{config,
+                 asked ? AxisZeros::WithoutMarks::NeedAZero : AxisZeros::WithoutMarks::Untouched};
 
   for (const auto& attachment : recording.attachments()) {
-    if (attachment.name != kDatumStateName) continue;
-    const auto state = datum_state_from_attachment(attachment);
+    if (attachment.name != kZeroStateName) continue;
+    const auto state = zero_state_from_attachment(attachment);
     ABBE_TRY(state);
-    datum.go_on(*state);
+    zero.go_on(*state);
   }
 
   for (const auto& attachment : recording.attachments()) {
-    if (attachment.name != kDatumName) continue;
-    const auto found = datum_from_attachment(attachment);
+    if (attachment.name != kZeroName) continue;
+    const auto found = zero_from_attachment(attachment);
     ABBE_TRY(found);
-    datum.found(*found);
+    zero.found(*found);
   }
 
-  return datum;
+  return zero;
 }
 
 /// For a counter card that was set up while one recording file was written and whose first sample
@@ -165,19 +166,19 @@ class SetUpBefore {
  public:
   explicit SetUpBefore(const RecordingReader& recording)
       : possible_(std::ranges::any_of(recording.attachments(),
-                                      [](const auto& a) { return a.name == kDatumStateName; })) {}
+                                      [](const auto& a) { return a.name == kZeroStateName; })) {}
 
   [[nodiscard]] bool possible() const { return possible_; }
   void take_live(const protocol::SampleHead& head) {
     if (has(head.flags, protocol::SampleFlag::Restarted)) at_ = head.time;
   }
   /// Applies the restart, if a live sample had one that the bytes do not show. Call it before
-  /// `datum` is applied to the samples decoded from the bytes.
-  void apply(const Batch& batch, Datum& datum) {
+  /// `zero` is applied to the samples decoded from the bytes.
+  void apply(const Batch& batch, AxisZeros& zero) {
     const bool seen = std::ranges::any_of(batch.axes, [](const auto& s) {
       return has(s.head.flags, protocol::SampleFlag::Restarted);
     });
-    if (at_ && !seen) datum.go_on({.at = *at_, .unknown = 0xff});
+    if (at_ && !seen) zero.go_on({.at = *at_, .unknown = 0xff});
     at_.reset();
   }
 
@@ -219,18 +220,18 @@ class Pace {
 /// What the live run got besides samples, from the attachments of the recording.
 struct Attached {
   std::vector<CalibrationRequest> requests;
-  Datum datum;
+  AxisZeros zero;
   MarkSearch marks;
 };
 
 Result<Attached> attached_to(const RecordingReader& recording, const Config& config) {
   auto requests = requests_of(recording);
   ABBE_TRY(requests);
-  auto datum = datum_of(recording, config);
-  ABBE_TRY(datum);
+  auto zero = zero_of(recording, config);
+  ABBE_TRY(zero);
   auto marks = MarkSearch::of(recording, config);
   ABBE_TRY(marks);
-  return Attached{std::move(*requests), std::move(*datum), std::move(*marks)};
+  return Attached{std::move(*requests), std::move(*zero), std::move(*marks)};
 }
 
 /// State of the counters at the end of the previous run, if the live run started with it. A state
@@ -320,11 +321,11 @@ class Replay : private PipelineObserver {
         config_(config),
         names_(device_names(config)),
         options_(options),
-        datum_(std::move(attached.datum)),
+        zeros_(std::move(attached.zero)),
         marks_(std::move(attached.marks)),
         calibrations_(recording, std::move(attached.requests), config, options),
         pipeline_(assembling(recording, config),
-                  options.source == ReplaySource::RawBytes ? &datum_ : nullptr),
+                  options.source == ReplaySource::RawBytes ? &zeros_ : nullptr),
         set_up_(recording) {
     pipeline_.add(*this);
     if (options.source == ReplaySource::Samples) {
@@ -361,7 +362,7 @@ class Replay : private PipelineObserver {
     pipeline_.finish(batch_.taken);
     report_.calibrations = calibrations_.finish();
     if (stopped()) return fail(ErrorCode::DataInsufficient, "replay: stopped before its end");
-    if (bytes_) report_.datums = marks_.compared(recording_);
+    if (bytes_) report_.zeros = marks_.compared(recording_);
     return std::move(report_);
   }
 
@@ -426,7 +427,7 @@ class Replay : private PipelineObserver {
   }
   void on_delivered(const Batch& batch) override {
     marks_.take(batch);
-    if (bytes_) set_up_.apply(batch, datum_);
+    if (bytes_) set_up_.apply(batch, zeros_);
   }
   void on_samples(const Batch& batch) override {
     report_.samples += batch.points.size() + batch.axes.size() + batch.touches.size() +
@@ -446,7 +447,7 @@ class Replay : private PipelineObserver {
   const Config& config_;
   DeviceNames names_;
   const ReplayOptions& options_;
-  Datum datum_;
+  AxisZeros zeros_;
   MarkSearch marks_;
   Calibrations calibrations_;
   Pipeline pipeline_;

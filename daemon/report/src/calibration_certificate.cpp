@@ -120,7 +120,7 @@ void write_statements(XmlText& out, const ReportSubject& subject, const UseOfMod
   out.open("dcc:statements");
   write_statement(out, has_as_left ? "Model, as found" : "Model", use.as_found);
   if (has_as_left) write_statement(out, "Model, as left", use.as_left);
-  write_statement(out, "Gauge", {gauge_in_words(document.model)});
+  write_statement(out, "Datum", {datum_in_words(document.model)});
   write_statement(out, "Signs", signs_in_words());
   write_statement(out, "Not contained in the uncertainty", not_in_the_uncertainty(document));
   write_statement(out, "Not estimable", not_estimable(document));

@@ -75,7 +75,7 @@ CertifiedValue of_both_directions(std::string key, std::string name,
 ValueGroup volume_group(const calib::iso::VolumeError& e) {
   return {
       "Volumetric error",
-      fmt::format("|V| of the functional point at {} points of the box, in the gauge of the "
+      fmt::format("|V| of the functional point at {} points of the box, in the datum of the "
                   "model, and without the rigid motion that fits best. U(V) = 2 "
                   "sqrt(u_x^2 + u_y^2 + u_z^2) of the model: |V| that is left after "
                   "compensation is below it with 95 to 99 %, apart from what the uncertainty does "

@@ -64,8 +64,8 @@ void add_states(HtmlReport& page, const Sides& sides) {
   row("verdict", [](const ReportSubject& s) { return verdict_in_words(s).text; });
   row("date (UTC)", [](const ReportSubject& s) { return when_in_words(s.document); });
   row("method", [](const ReportSubject& s) { return method_in_words(s.document); });
-  row("gauge",
-      [](const ReportSubject& s) { return std::string{calib::name(s.document.model.gauge())}; });
+  row("datum",
+      [](const ReportSubject& s) { return std::string{calib::name(s.document.model.datum())}; });
   row("tool offsets", [](const ReportSubject& s) { return tools_in_words(s.document.model); });
   page.table({"", "A", "B"}, rows);
   page.paragraph("A: " + box_in_words(sides.values_a.standard));

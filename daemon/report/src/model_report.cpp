@@ -69,7 +69,7 @@ void add_parameters(HtmlReport& page, const calib::VolumetricModel& model) {
   if (model.tables() != nullptr) {
     page.heading("Error motions: tables of the model");
     page.paragraph(
-        "Bands: U = 2 u (k = 2) in the gauge of the model; the legend gives the largest U of each "
+        "Bands: U = 2 u (k = 2) in the datum of the model; the legend gives the largest U of each "
         "table.");
     for (const LineChart& chart : table_line_charts(model)) page.plot(chart);
     return;
@@ -87,8 +87,8 @@ void add_words(HtmlReport& page, const ModelDocument& document) {
   page.list(not_in_the_uncertainty(document));
   page.heading("What cannot be estimated, and why");
   page.list(not_estimable(document));
-  page.heading("Gauge and signs");
-  page.paragraph(gauge_in_words(document.model));
+  page.heading("Datum and signs");
+  page.paragraph(datum_in_words(document.model));
   page.list(signs_in_words());
 }
 

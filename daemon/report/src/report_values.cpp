@@ -120,7 +120,7 @@ void add_field(HtmlReport& page, const calib::VolumetricModel& model,
   for (const auto& [q_m, V_m] : vectors)
     drawing.lines.push_back({"", kMmPerM * q_m, kMmPerM * (q_m + magnification * V_m)});
   page.heading("The error in space");
-  page.paragraph("Dot: scale reading. Line: V there, magnified, in the gauge of the model.");
+  page.paragraph("Dot: scale reading. Line: V there, magnified, in the datum of the model.");
   page.drawing(drawing);
 }
 

@@ -23,18 +23,18 @@ std::vector<std::string> missing_tables(const calib::VolumetricModel& model) {
   return missing;
 }
 
-bool is_blocks_gauge(const calib::VolumetricModel& model) {
-  return model.gauge() == calib::Gauge::Ball1Blocks;
+bool is_blocks_datum(const calib::VolumetricModel& model) {
+  return model.datum() == calib::ModelDatum::Ball1Blocks;
 }
 
 }  // namespace
 
-std::string gauge_in_words(const calib::VolumetricModel& model) {
-  const std::string name{calib::name(model.gauge())};
+std::string datum_in_words(const calib::VolumetricModel& model) {
+  const std::string name{calib::name(model.datum())};
   if (const auto* polynomials = model.polynomials(); polynomials != nullptr)
     return fmt::format(
         "{}: V is 0 at ball 1 ({}). {}", name, place_mm(polynomials->ball1_m()),
-        is_blocks_gauge(model)
+        is_blocks_datum(model)
             ? "The rotation of V about ball 1 is that which the machine measured at the blocks."
             : "The rotation of V about ball 1 comes from another instrument.");
 
@@ -46,11 +46,11 @@ std::string gauge_in_words(const calib::VolumetricModel& model) {
   return fmt::format(
       "{}: positioning and angular errors are 0 at the reference position of their axis ({}), "
       "straightness errors are 0 at the first and the last node; squareness errors act on the "
-      "distance from {}. Another gauge describes the same machine with other numbers; the values "
+      "distance from {}. Another datum describes the same machine with other numbers; the values "
       "of "
       "the standards do not depend on it.",
       name, fmt::join(references, ", "),
-      model.gauge() == calib::Gauge::G1 ? "machine zero" : "the reference position");
+      model.datum() == calib::ModelDatum::G1 ? "machine zero" : "the reference position");
 }
 
 std::vector<std::string> signs_in_words() {

@@ -34,7 +34,7 @@ void add_model_origin(HtmlReport& page, const ModelDocument& document,
       {"method",
        fmt::format("{}{}, {}", document.method,
                    document.mode.empty() ? "" : " (" + document.mode + ")", document.estimator)},
-      {"gauge", std::string{calib::name(document.model.gauge())}},
+      {"datum", std::string{calib::name(document.model.datum())}},
       {"created (UTC)", to_text(document.created)}};
   facts.insert(facts.end(), more.begin(), more.end());
   page.facts(facts);

@@ -232,7 +232,7 @@ void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
   const Vector3 tool_mm = model.tool_offsets_m().front() * kMmPerM;
   page.paragraph(fmt::format(
       "Three cuts through the volume in which the model is valid, for the tool offset {:.1f}, "
-      "{:.1f}, {:.1f} mm. V: actual minus nominal position, in the gauge of the model, without a "
+      "{:.1f}, {:.1f} mm. V: actual minus nominal position, in the datum of the model, without a "
       "rigid motion of the whole volume. Cells outside the volume or without data are hatched. "
       "Each row has its own scale.",
       tool_mm.x(), tool_mm.y(), tool_mm.z()));
@@ -248,7 +248,7 @@ void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
         model.misfit() != nullptr ? summary(maps.misfit) : "none found"}});
   page.paragraph(
       "U(V): twice the root of the sum of the variances of the three components (coverage factor k "
-      "= 2), in the gauge of the model. |V| that is left after compensation is below U(V) with 95 "
+      "= 2), in the datum of the model. |V| that is left after compensation is below U(V) with 95 "
       "to "
       "99 %, apart from what U(V) does not contain: lack of fit that the residuals do not show, "
       "and "

@@ -183,8 +183,8 @@ Result<OnHub> cancel(const HubParts&, const json& request) {
   };
 }
 
-SetDatumHere stand_here(const HubParts& parts, const std::vector<std::string>& axes, double u) {
-  SetDatumHere here{.axes = axes, .u = u, .now = parts.time.now()};
+SetZeroHere stand_here(const HubParts& parts, const std::vector<std::string>& axes, double u) {
+  SetZeroHere here{.axes = axes, .u = u, .now = parts.time.now()};
   here.patience = parts.time.host(here.patience);
   here.acquiring = takes_readings(parts.calibration.session().status().state);
   return here;
@@ -215,9 +215,9 @@ Result<std::vector<std::string>> axes_of(const json& request) {
 Result<OnHub> reference_here(const HubParts&, const json& request) {
   auto axes = axes_of(request);
   ABBE_TRY(axes);
-  return with_reference([axes = std::move(*axes), u = request.value("u", SetDatumHere::kByEye)](
+  return with_reference([axes = std::move(*axes), u = request.value("u", SetZeroHere::kByEye)](
                             ReferenceService& service, const HubParts& parts) {
-    return service.set_datum_here(stand_here(parts, axes, u));
+    return service.set_zero_here(stand_here(parts, axes, u));
   });
 }
 

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::chrono::seconds kRewritten{5};
 
-bool same_datum(const std::vector<FoundDatum>& a, const std::vector<FoundDatum>& b) {
-  return std::ranges::equal(a, b, [](const FoundDatum& x, const FoundDatum& y) {
+bool same_zero(const std::vector<FoundZero>& a, const std::vector<FoundZero>& b) {
+  return std::ranges::equal(a, b, [](const FoundZero& x, const FoundZero& y) {
     return x.axis == y.axis && x.reading_at_zero == y.reading_at_zero && x.u == y.u &&
            x.stated == y.stated;
   });
@@ -107,7 +107,7 @@ void CountingStateThread::Work::look(bool last) {
     if (!left_running) state = look_at();
   }
   if (!state) return;
-  const bool changed = !written || !same_datum(written->counting.datum, state->counting.datum);
+  const bool changed = !written || !same_zero(written->counting.zero, state->counting.zero);
   if (changed || last || Clock::now() - written_at >= kRewritten) write(*state);
 }
 

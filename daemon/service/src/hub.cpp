@@ -133,7 +133,7 @@ struct Hub::Call {
 Hub::Hub(HubParts parts)
     : parts_(parts),
       pipeline_(assembler_options(parts.config),
-                parts.reference != nullptr ? &parts.reference->datum() : nullptr),
+                parts.reference != nullptr ? &parts.reference->zeros() : nullptr),
       live_(assembler_options(parts.config), parts.time),
       touches_by_(device_names(parts.config).touches) {
   if (parts_.sensor_state) {

@@ -26,7 +26,7 @@ ReferenceService::ReferenceService(const Config& config, RecorderThread* recorde
       counted_(counted_axes(config)),
       marks_(reference_marks(config)),
       recorder_(recorder),
-      datum_(config),
+      zeros_(config),
       left_(std::move(left)) {}
 
 Result<void> ReferenceService::start() {
@@ -36,7 +36,7 @@ Result<void> ReferenceService::start() {
   if (running_)
     return fail(ErrorCode::Refused, "reference: a search for the marks is running already");
   session_.emplace(reference_options(*marks_, *counted_));
-  datum_used_.assign(marks_->axes.size(), false);
+  zero_used_.assign(marks_->axes.size(), false);
   running_ = true;
   from_ = newest_;
   if (recorder_ != nullptr) recorder_->attach(reference_request(newest_), newest_);
@@ -50,7 +50,7 @@ Result<void> ReferenceService::cancel() {
 }
 
 void ReferenceService::on_delivered(const Batch& batch) {
-  if (left_ && !batch.axes.empty()) use_datum_left(batch.axes.front());
+  if (left_ && !batch.axes.empty()) use_zeros_left(batch.axes.front());
   for (const auto& sample : batch.axes) {
     if (has(sample.head.flags, protocol::SampleFlag::Restarted)) {
       restarted_at_ = sample.head.time;
@@ -63,19 +63,19 @@ void ReferenceService::on_delivered(const Batch& batch) {
   if (running_) look_for_marks(batch);
 }
 
-/// Takes over the datum of every axis from the previous run, if the counters have continued. These
-/// datums are recorded in the same way as at the start of a further recording file.
-void ReferenceService::use_datum_left(const protocol::AxisSample& first) {
+/// Takes over the zero of every axis from the previous run, if the counters have continued. These
+/// zeros are recorded in the same way as at the start of a further recording file.
+void ReferenceService::use_zeros_left(const protocol::AxisSample& first) {
   const Counting left = *std::exchange(left_, std::nullopt);
   if (has(first.head.flags, protocol::SampleFlag::Restarted)) return;
-  const DatumState nothing_known{.at = first.head.time - 1ns, .unknown = 0xff};
+  const ZeroState nothing_known{.at = first.head.time - 1ns, .unknown = 0xff};
   newest_ = first.head.time;
-  datum_.go_on(nothing_known);
+  zeros_.go_on(nothing_known);
   if (recorder_ != nullptr) recorder_->attach(to_attachment(nothing_known), newest_);
-  for (FoundDatum datum : left.datum) {
-    datum.from = nothing_known.at;
-    use_datum(datum);
-    carried_on_.push_back(counted_->axes()[datum.axis].name);
+  for (FoundZero zero : left.zero) {
+    zero.from = nothing_known.at;
+    use_zero(zero);
+    carried_on_.push_back(counted_->axes()[zero.axis].name);
   }
 }
 
@@ -90,32 +90,32 @@ void ReferenceService::take(const std::optional<CountingProgress>& progress) {
 
 std::optional<Counting> ReferenceService::counting() const {
   if (!progress_) return std::nullopt;
-  return Counting{.progress = *progress_, .datum = datum_.current()};
+  return Counting{.progress = *progress_, .zero = zeros_.current()};
 }
 
 void ReferenceService::look_for_marks(const Batch& batch) {
   for (const auto& crossing : batch.marks)
     if (crossing.head.time > from_) session_->take(crossing);
   for (const auto& sample : batch.axes) session_->take(sample);
-  for (std::size_t i = 0; i < datum_used_.size(); ++i) {
+  for (std::size_t i = 0; i < zero_used_.size(); ++i) {
     const bool found = session_->axis(i).state == AxisReference::State::Found;
-    if (found && !datum_used_[i]) use_datum(i);
-    datum_used_[i] = found;  // false again after a restart of the card
+    if (found && !zero_used_[i]) use_zero(i);
+    zero_used_[i] = found;  // false again after a restart of the card
   }
   if (session_->finished()) running_ = false;
 }
 
-void ReferenceService::use_datum(std::size_t axis) {
-  const FoundDatum datum{.axis = session_->options().axes[axis].live_axis,
-                         .reading_at_zero = reading_at_zero(axis),
-                         .u = session_->axis(axis).u_offset,
-                         .from = newest_};
-  use_datum(datum);
+void ReferenceService::use_zero(std::size_t axis) {
+  const FoundZero zero{.axis = session_->options().axes[axis].live_axis,
+                       .reading_at_zero = reading_at_zero(axis),
+                       .u = session_->axis(axis).u_offset,
+                       .from = newest_};
+  use_zero(zero);
 }
 
-void ReferenceService::use_datum(const FoundDatum& datum) {
-  datum_.found(datum);
-  if (recorder_ != nullptr) recorder_->attach(to_attachment(datum), newest_);
+void ReferenceService::use_zero(const FoundZero& zero) {
+  zeros_.found(zero);
+  if (recorder_ != nullptr) recorder_->attach(to_attachment(zero), newest_);
 }
 
 std::vector<std::string> ReferenceService::without_marks() const {
@@ -131,7 +131,7 @@ std::vector<std::string> ReferenceService::unknown() const {
   if (!counted_) return names;
   const auto& axes = counted_->axes();
   for (std::size_t i = 0; i < axes.size(); ++i)
-    if (!datum_.known(i)) names.push_back(axes[i].name);
+    if (!zeros_.known(i)) names.push_back(axes[i].name);
   return names;
 }
 
@@ -168,7 +168,7 @@ Result<void> ReferenceService::check_standing(std::size_t axis) const {
   return {};
 }
 
-Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
+Result<void> ReferenceService::set_zero_here(const SetZeroHere& here) {
   const auto possible = without_marks();
   for (const auto& name : here.axes)
     if (std::ranges::find(possible, name) == possible.end())
@@ -177,11 +177,11 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
   if (possible.empty())
     return fail(ErrorCode::Usage, "reference: no axis without reference marks is configured");
   if (!(here.u > 0.0) || !std::isfinite(here.u))
-    return fail(ErrorCode::Usage, "reference: the uncertainty of the datum must be positive");
+    return fail(ErrorCode::Usage, "reference: the uncertainty of the zero must be positive");
   if (here.acquiring)
     return fail(
         ErrorCode::Refused,
-        "reference: a calibration takes readings: a new datum would make them inconsistent; wait "
+        "reference: a calibration takes readings: a new zero would make them inconsistent; wait "
         "until it has ended, or cancel it");
   if (!latest_)
     return fail(ErrorCode::Refused, "reference: the counter card has not delivered a sample yet");
@@ -200,11 +200,11 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
 
   for (const std::size_t place : places) {
     const double counted = live[place].scale * static_cast<double>(latest_->count[place]);
-    use_datum(FoundDatum{.axis = place,
-                         .reading_at_zero = live[place].offset - counted,
-                         .u = here.u,
-                         .from = newest_,
-                         .stated = true});
+    use_zero(FoundZero{.axis = place,
+                       .reading_at_zero = live[place].offset - counted,
+                       .u = here.u,
+                       .from = newest_,
+                       .stated = true});
   }
 
   return {};
@@ -221,7 +221,7 @@ std::vector<ReferenceService::AxisStatus> ReferenceService::status() const {
   for (std::size_t i = 0; i < options.axes.size(); ++i) {
     AxisStatus& axis = all.emplace_back();
     axis.name = options.axes[i].name;
-    axis.known = datum_.known(options.axes[i].live_axis);
+    axis.known = zeros_.known(options.axes[i].live_axis);
     if (!session_) continue;
     axis.found = session_->axis(i);
     if (axis.found.state == AxisReference::State::Found) axis.reading_at_zero = reading_at_zero(i);

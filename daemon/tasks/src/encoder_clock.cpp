@@ -24,7 +24,7 @@ calib::otf::EncoderLog encoder_log(std::span<const EncoderRow> rows, double u_ti
 calib::otf::ClockMap clock_of_files(const calib::otf::ClockMap& clock, const TimesOfFile& tracker,
                                     const TimesOfFile& encoder) {
   return {clock.offset_s + (encoder.first_time_s - tracker.first_time_s), clock.drift,
-          clock.reference_s + tracker.first_time_s};
+          clock.origin_s + tracker.first_time_s};
 }
 
 std::string clock_text(const calib::otf::Synchronisation& s, double u_time_us) {
@@ -33,16 +33,16 @@ std::string clock_text(const calib::otf::Synchronisation& s, double u_time_us) {
       "uncertainty {:.3f} us;\n            drift {:.4f} ppm, standard uncertainty {:.4f} ppm\n"
       "along       {} observations along the path; times of readings within {:.1f} us "
       "(stated {:.1f} us, chi2/dof {:.3f})\n",
-      s.clock.offset_s * kUsPerS, s.clock.reference_s, s.u_offset_s * kUsPerS,
+      s.clock.offset_s * kUsPerS, s.clock.origin_s, s.u_offset_s * kUsPerS,
       s.clock.drift * kDriftPpm, s.u_drift * kDriftPpm, s.rows, s.sigma_factor * u_time_us,
       u_time_us, s.chi2_per_dof);
 }
 
 nlohmann::json clock_json(const calib::otf::Synchronisation& s, double u_time_us) {
-  return {{"offset_us", s.clock.offset_s * kUsPerS},  {"u_offset_us", s.u_offset_s * kUsPerS},
-          {"drift_ppm", s.clock.drift * kDriftPpm},   {"u_drift_ppm", s.u_drift * kDriftPpm},
-          {"at_tracker_time_s", s.clock.reference_s}, {"observations_along", s.rows},
-          {"chi2_per_dof_along", s.chi2_per_dof},     {"uncertainty_factor_along", s.sigma_factor},
+  return {{"offset_us", s.clock.offset_s * kUsPerS}, {"u_offset_us", s.u_offset_s * kUsPerS},
+          {"drift_ppm", s.clock.drift * kDriftPpm},  {"u_drift_ppm", s.u_drift * kDriftPpm},
+          {"at_tracker_time_s", s.clock.origin_s},   {"observations_along", s.rows},
+          {"chi2_per_dof_along", s.chi2_per_dof},    {"uncertainty_factor_along", s.sigma_factor},
           {"u_time_us", s.sigma_factor * u_time_us}};
 }
 

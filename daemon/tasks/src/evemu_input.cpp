@@ -157,7 +157,7 @@ Result<EvemuInput> from_recording(const EvemuInputArguments& arguments, const Pr
   EvemuInput input{std::move(recording->config),
                    {recording->source},
                    std::move(*observed),
-                   run->asked.reference};
+                   run->asked.rotation_reference};
   const auto entered = inputs_of(*run);
   input.sources.insert(input.sources.end(), entered.begin(), entered.end());
   input.recording_gap = recording->reader.damage();
@@ -177,13 +177,13 @@ Result<EvemuInput> read_evemu_input(const EvemuInputArguments& arguments,
 }
 
 Result<void> read_rotation_reference(const EvemuInputArguments& arguments, EvemuInput& input) {
-  if (arguments.reference.empty()) return {};
-  const auto points = read_errors_csv(arguments.reference);
+  if (arguments.rotation_reference.empty()) return {};
+  const auto points = read_errors_csv(arguments.rotation_reference);
   ABBE_TRY(points);
-  ABBE_TRY(check_travel(arguments.reference, positions_of(points->errors), points->lines,
+  ABBE_TRY(check_travel(arguments.rotation_reference, positions_of(points->errors), points->lines,
                         input.config.machine));
   input.sources.push_back(points->source);
-  input.reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
+  input.rotation_reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
   return {};
 }
 

@@ -58,19 +58,19 @@ Result<void> add_nodes(ExportRequest& request, const ExportArguments& arguments)
   ABBE_TRY(part);
   const auto& model = request.document.model;
   const auto box = calib::export_box(model, *part);
-  if (!box) return fail(ErrorCode::Usage, "--volume: " + box.error().text);
+  if (!box) return fail(ErrorCode::Usage, "--volume-mm: " + box.error().text);
   request.box = *box;
 
   calib::NodeOptions options{.equidistant = request.facts->equidistant};
   if (arguments.step_mm) options.step_m = *arguments.step_mm / kMmPerM;
   const auto nodes = calib::export_nodes(model, *box, options);
-  if (!nodes) return fail(ErrorCode::Usage, "--step: " + nodes.error().text);
+  if (!nodes) return fail(ErrorCode::Usage, "--step-mm: " + nodes.error().text);
   request.nodes_m = *nodes;
   constexpr std::size_t kMostGridNodes = 1'000'000;
   const std::size_t count = (*nodes)[0].size() * (*nodes)[1].size() * (*nodes)[2].size();
   if (request.facts->holds == HeldPart::Grid && count > kMostGridNodes)
     return fail(ErrorCode::Usage,
-                fmt::format("--step: {} nodes of the grid; at most {}", count, kMostGridNodes));
+                fmt::format("--step-mm: {} nodes of the grid; at most {}", count, kMostGridNodes));
   return {};
 }
 

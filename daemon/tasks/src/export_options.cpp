@@ -50,8 +50,9 @@ Result<std::optional<calib::ExportBox>> volume_of(const std::string& text) {
       numbers.push_back(value / kMmPerM);
   }
   if (parts.size() != 6 || numbers.size() != 6)
-    return fail(ErrorCode::Usage,
-                fmt::format("--volume \"{}\": must be xmin,xmax,ymin,ymax,zmin,zmax in mm", text));
+    return fail(
+        ErrorCode::Usage,
+        fmt::format("--volume-mm \"{}\": must be xmin,xmax,ymin,ymax,zmin,zmax in mm", text));
   return calib::ExportBox{{numbers[0], numbers[2], numbers[4]},
                           {numbers[1], numbers[3], numbers[5]}};
 }

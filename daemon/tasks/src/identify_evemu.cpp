@@ -89,7 +89,7 @@ Result<EvemuOutcome> identify_evemu(const IdentifyEvemuArguments& arguments,
 
   const auto other = comparison_model(*active, input->config);
   auto candidate = identify_with_array(
-      {std::move(input->observations), *std::move(judging), std::move(input->reference)},
+      {std::move(input->observations), *std::move(judging), std::move(input->rotation_reference)},
       other.model);
   ABBE_TRY(candidate);
   calib::Verdict& verdict = candidate->verdict;

@@ -87,7 +87,8 @@ Result<JointOutcome> judged(const IdentifyJointArguments& arguments, JointInput 
 
 Result<std::variant<JointOutcome, JointContradiction>> identify_joint(
     const IdentifyJointArguments& arguments, const Progress& progress) {
-  ABBE_TRY(require_word("--estimator", arguments.estimator.value_or(""), {"two-step", "joint"}));
+  ABBE_TRY(
+      require_word("--estimator", arguments.estimator.value_or(""), {"two-step", "simultaneous"}));
   auto input = read_joint_input(arguments, progress);
   ABBE_TRY(input);
   auto identified =

@@ -155,7 +155,7 @@ Result<MfbCandidate> identified(const IdentifyMfbArguments& arguments, const Mfb
 }
 
 Result<void> check(const IdentifyMfbArguments& arguments) {
-  ABBE_TRY(require_word("--estimator", arguments.estimator, {"joint", "sequential"}));
+  ABBE_TRY(require_word("--estimator", arguments.estimator, {"simultaneous", "sequential"}));
   if (!arguments.recording.empty())
     return require_none("--recording", {{"--points", !arguments.points.empty()},
                                         {"--bar", !arguments.bar.empty()},

@@ -31,7 +31,7 @@ namespace otf = calib::otf;
 std::string_view words(otf::Stage stage) {
   switch (stage) {
     case otf::Stage::Observe:
-      return "averaging blocks";
+      return "averaging segments";
     case otf::Stage::Align:
       return "aligning";
     case otf::Stage::Solve:
@@ -85,8 +85,8 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
   const auto& s = candidate.solution.statistics;
   return {std::move(document),
           std::move(candidate.verdict),
-          s.blocks,
-          s.blocks_used,
+          s.segments,
+          s.segments_used,
           {candidate.solution.range_offset},
           candidate.solution.synchronisation,
           candidate.solution.smoothness};
@@ -164,7 +164,7 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (files->encoder) options.orientation.scales_agree = true;
   ABBE_TRY(apply_frame(files->tracker, arguments.tracker, options));
-  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
+  if (arguments.segment_samples > 0) options.segment_samples = arguments.segment_samples;
   options.progress = [&](otf::Stage stage, double fraction) {
     progress.show(words(stage), fraction);
   };
@@ -196,7 +196,8 @@ namespace {
 
 Result<void> check_words(const IdentifyOtfArguments& arguments) {
   ABBE_TRY(require_word("--mode", arguments.mode, {"on-the-fly", "standstill"}));
-  ABBE_TRY(require_word("--estimator", arguments.estimator.value_or(""), {"two-step", "joint"}));
+  ABBE_TRY(
+      require_word("--estimator", arguments.estimator.value_or(""), {"two-step", "simultaneous"}));
   ABBE_TRY(require_word("--tables", arguments.tables,
                         {calib::kLinearBasis, calib::kCubicBasis, calib::kNotAKnotCubicBasis}));
   return require_word("--backlash", arguments.backlash, {"none", "per-table", "forward-backward"});
@@ -207,12 +208,12 @@ Result<void> check_sources(const IdentifyOtfArguments& arguments) {
   const bool has_files = !arguments.tracker.empty() || !arguments.targets.empty();
   if (!has_files && arguments.recording.empty())
     return fail(ErrorCode::Usage,
-                "identify otf needs --machine, --path and --tracker (or several --target), or "
+                "identify otf needs --machine, --path and --tracker (or several --target-mm), or "
                 "--recording");
   if (!arguments.recording.empty())
     return require_none("--recording", {{"--path", !arguments.path.empty()},
                                         {"--tracker", !arguments.tracker.empty()},
-                                        {"--target", !arguments.targets.empty()},
+                                        {"--target-mm", !arguments.targets.empty()},
                                         {"--encoder", !arguments.encoder.empty()},
                                         {"--mode", !arguments.mode.empty()},
                                         {"--u-scale-ppm", arguments.u_scale_ppm.has_value()},
@@ -220,8 +221,8 @@ Result<void> check_sources(const IdentifyOtfArguments& arguments) {
   ABBE_TRY(require_all("identify otf", {{"--machine", !arguments.machine.empty()},
                                         {"--path", !arguments.path.empty()}}));
   if (arguments.targets.empty()) return {};
-  return require_none("--target", {{"--tracker", !arguments.tracker.empty()},
-                                   {"--encoder", !arguments.encoder.empty()}});
+  return require_none("--target-mm", {{"--tracker", !arguments.tracker.empty()},
+                                      {"--encoder", !arguments.encoder.empty()}});
 }
 
 /// Reads --tracker-centre-mm.
@@ -236,9 +237,10 @@ Result<void> read_tracker_centres(IdentifyOtfArguments& arguments) {
     return {};
   return fail(
       ErrorCode::Usage,
-      fmt::format("--tracker-centre-mm is given {} times, --target {} times: give the centre once, "
-                  "or once for each --target",
-                  arguments.tracker_centres_m.size(), arguments.targets.size()));
+      fmt::format(
+          "--tracker-centre-mm is given {} times, --target-mm {} times: give the centre once, "
+          "or once for each --target-mm",
+          arguments.tracker_centres_m.size(), arguments.targets.size()));
 }
 
 Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,

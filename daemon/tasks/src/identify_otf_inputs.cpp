@@ -48,7 +48,8 @@ Result<void> apply_smoothness(const std::string& text, Config& config) {
   if (text == "none") return {};
 
   const bool is_one = text.find(',') == std::string::npos;
-  const auto size_mm = parse_mm("--smoothness", is_one ? fmt::format("{0},{0},{0}", text) : text);
+  const auto size_mm =
+      parse_mm("--smoothness-um", is_one ? fmt::format("{0},{0},{0}", text) : text);
   const calib::Vector3 bend_m =
       size_mm ? calib::Vector3(*size_mm * kMmPerM / kUmPerM) : calib::Vector3::Zero();
   bool valid = bend_m.maxCoeff() > 0.0;
@@ -56,7 +57,7 @@ Result<void> apply_smoothness(const std::string& text, Config& config) {
     valid = valid && (value_m == 0.0 || otf::is_bend_size(value_m));
   if (!valid)
     return fail(ErrorCode::Usage,
-                fmt::format("--smoothness \"{}\": must be none, or the standard deviation of "
+                fmt::format("--smoothness-um \"{}\": must be none, or the standard deviation of "
                             "the bend over nodes 50 mm apart in um, 0.01 to 1000: one number, or "
                             "X,Y,Z with 0 for no prior",
                             text));

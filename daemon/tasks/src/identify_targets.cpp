@@ -1,4 +1,4 @@
-// `abbe identify otf --target ...`: several runs, each with another target offset.
+// `abbe identify otf --target-mm ...`: several runs, each with another target offset.
 #include <fmt/format.h>
 
 #include <array>
@@ -31,7 +31,7 @@ struct TargetRuns : MachineAndPath {
 
 Error not_a_target(const std::string& text) {
   return {ErrorCode::Usage,
-          fmt::format("--target {}: must be X,Y,Z=FILE, for example 20,-15,-120=tracker1.csv; "
+          fmt::format("--target-mm {}: must be X,Y,Z=FILE, for example 20,-15,-120=tracker1.csv; "
                       "X, Y, Z in mm",
                       text)};
 }
@@ -77,7 +77,7 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, const Progre
 
 Result<void> check_runs(const IdentifyOtfArguments& arguments, TargetRuns& all) {
   ABBE_TRY(check_scales("identify otf", "a path", all.config, arguments.scales_corrected));
-  all.config.machine.target_given = true;  // by --target
+  all.config.machine.target_given = true;  // by --target-mm
   return check_path(arguments.path, all.path, all.config);
 }
 
@@ -112,7 +112,7 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
 
   calib::otf::Options options = otf_options(all->runs.front().tracker.points, all->config);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
-  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
+  if (arguments.segment_samples > 0) options.segment_samples = arguments.segment_samples;
   options.progress = [&](calib::otf::Stage stage, double fraction) {
     progress.show(words(stage), fraction);
   };

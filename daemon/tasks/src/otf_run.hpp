@@ -23,10 +23,10 @@ struct MachineAndPath {
 /// --u-scale-ppm, or that of the configured tracker; 0 without both.
 [[nodiscard]] double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config);
 
-/// Sets the prior for smooth tables as --smoothness (`text`) states: none, UM or
+/// Sets the prior for smooth tables as --smoothness-um (`text`) states: none, UM or
 /// UM_X,UM_Y,UM_Z. Error Usage for another text.
 [[nodiscard]] Result<void> apply_smoothness(const std::string& text, Config& config);
-/// The options of the command replace those of the configuration; --smoothness apart.
+/// The options of the command replace those of the configuration; --smoothness-um apart.
 void apply(const IdentifyOtfArguments& arguments, Config& config);
 
 /// Refuses the model of a run whose points state a place of the tracker that their noise
@@ -49,7 +49,7 @@ void judge_beams(const TrackerFile& points, const calib::otf::Observations& obse
                                                 const std::optional<ActiveDocument>& active,
                                                 const Progress& progress);
 
-/// Identifies all 18 tables from the runs of --target.
+/// Identifies all 18 tables from the runs of --target-mm.
 [[nodiscard]] Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
                                               const std::optional<ActiveDocument>& active,
                                               const Progress& progress);

@@ -24,15 +24,16 @@ namespace mfb = calib::mfb;
 /// "x,y,z" or "x,y,z,-x": the stem along an axis.
 Result<mfb::Stylus> parse_stylus(const std::string& text, const calib::KinematicChain& chain) {
   const auto malformed = [&] {
-    return fail(ErrorCode::Usage,
-                fmt::format("--stylus \"{}\": must be x,y,z in mm, from the tool reference point "
-                            "to the tip, or x,y,z and the direction of the stem: x,y,z,-x",
-                            text));
+    return fail(
+        ErrorCode::Usage,
+        fmt::format("--stylus-mm \"{}\": must be x,y,z in mm, from the tool reference point "
+                    "to the tip, or x,y,z and the direction of the stem: x,y,z,-x",
+                    text));
   };
   const auto comma = text.rfind(',');
   const std::string last = comma == std::string::npos ? "" : text.substr(comma + 1);
   const bool directed = !last.empty() && std::isalpha(static_cast<unsigned char>(last.back())) != 0;
-  const auto offset_m = parse_mm("--stylus", directed ? text.substr(0, comma) : text);
+  const auto offset_m = parse_mm("--stylus-mm", directed ? text.substr(0, comma) : text);
   if (!offset_m) return malformed();
 
   mfb::Stylus stylus = mfb::stylus_of(*offset_m, chain);
@@ -78,7 +79,7 @@ Result<std::optional<mfb::RotaryTable>> table_of(const PlanMfbArguments& argumen
   mfb::RotaryTable table{.centre_m = mfb::middle_of_travel(task),
                          .swivel = arguments.swivel == "A" ? calib::Axis::X : calib::Axis::Y};
   if (!arguments.rotary_at.empty()) {
-    const auto at = parse_mm("--rotary-at", arguments.rotary_at);
+    const auto at = parse_mm("--rotary-at-mm", arguments.rotary_at);
     ABBE_TRY(at);
     table.centre_m = *at;
   }
@@ -177,7 +178,8 @@ Result<BarPlan> plan_mfb(const PlanMfbArguments& arguments, const PlanInputs& in
   plan.notes = set->notes;
   if (!plan.notes.empty())
     plan.notes.emplace_back(
-        "bars that are inclined or overlap are for identify mfb --estimator joint, the default");
+        "bars that are inclined or overlap are for identify mfb --estimator simultaneous, the "
+        "default");
   plan.missing = set->missing;
   auto positions = set->positions;
   if (arguments.best) {

@@ -22,7 +22,7 @@ namespace {
 
 /// The configuration file that the options stand for, without tracker and devices.
 Result<Config> machine_of_options(const PlanOtfArguments& arguments) {
-  const auto tool_m = parse_mm("--tool", arguments.tool);
+  const auto tool_m = parse_mm("--tool-mm", arguments.tool);
   ABBE_TRY(tool_m);
   std::string text =
       fmt::format("[machine]\nname = \"command line\"\nchain = \"{}\"\n", arguments.chain);
@@ -40,7 +40,7 @@ Result<std::vector<calib::Vector3>> trackers_of(const PlanOtfArguments& argument
                                                 const MachineConfig& machine) {
   std::vector<calib::Vector3> trackers;
   for (const auto& text : arguments.trackers) {
-    const auto at = parse_mm("--tracker-at", text);
+    const auto at = parse_mm("--tracker-at-mm", text);
     ABBE_TRY(at);
     trackers.push_back(*at);
   }
@@ -49,7 +49,7 @@ Result<std::vector<calib::Vector3>> trackers_of(const PlanOtfArguments& argument
   if (trackers.empty())
     return fail(
         ErrorCode::Usage,
-        fmt::format("plan otf: the position of the tracker is unknown: --tracker-at x,y,z in "
+        fmt::format("plan otf: the position of the tracker is unknown: --tracker-at-mm x,y,z in "
                     "machine coordinates, or {} position_mm in the configuration",
                     tables_with(Capability::TrackerPoints)));
   return trackers;

@@ -34,7 +34,7 @@ Result<calib::Vector3> parse_mm(const std::string& option, const std::string& te
 Result<calib::Vector3> tool_of(const std::string& text, const calib::VolumetricModel& model) {
   calib::Vector3 tool_m = model.tool_offsets_m().front();
   if (!text.empty()) {
-    auto given = parse_mm("--tool", text);
+    auto given = parse_mm("--tool-mm", text);
     if (!given) return given;
     tool_m = *given;
   }

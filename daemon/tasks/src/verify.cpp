@@ -75,7 +75,7 @@ Result<void> check_tools(const std::vector<ModelAtPoints>& models) {
   if (other == models.end()) return {};
   return fail(ErrorCode::Usage,
               fmt::format("{} and {} have different tool offsets, the points were measured with "
-                          "one: give it with --tool",
+                          "one: give it with --tool-mm",
                           first.model.name, other->model.name));
 }
 

@@ -242,7 +242,7 @@ function origin(model) {
     ["machine", `${model.machine}, chain ${model.chain}`], ["tools", model.tools],
     ["solution", `${model.observations} observations, ${model.unknowns} unknowns, rank ` +
       `${model.rank}, condition ${model.condition.toPrecision(3)}, sigma0 ${fixed(model.sigma0, 3)}`],
-    ["gauge", model.gauge],
+    ["datum", model.datum],
     ["inputs", model.inputs.map((i) => i.name).join(", ")]]);
 }
 

@@ -137,7 +137,7 @@ json model_json(const daemon::ReportSubject& subject) {
           {"method", daemon::method_in_words(document)},
           {"created", daemon::to_text(document.created)},
           {"chain", document.model.chain().text()},
-          {"gauge", daemon::gauge_in_words(document.model)},
+          {"datum", daemon::datum_in_words(document.model)},
           {"tools", daemon::tools_in_words(document.model)},
           {"signs", daemon::signs_in_words()},
           {"observations", s.observations},

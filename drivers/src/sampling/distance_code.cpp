@@ -81,42 +81,42 @@ std::optional<std::int64_t> first_mark(const DistanceCode& code, std::int64_t di
   return on_circle(code, P1);
 }
 
-tl::expected<MarkDatum, MarkFault> datum_of(
-    const DistanceCode& code, std::span<const double, kMarksForDatum> marks) noexcept {
-  MarkDatum datum;
-  datum.direction = marks[1] > marks[0] ? 1 : -1;
-  std::array<std::int64_t, kMarksForDatum> position{};
+tl::expected<MarkZero, MarkFault> zero_of(const DistanceCode& code,
+                                          std::span<const double, kMarksForZero> marks) noexcept {
+  MarkZero zero;
+  zero.direction = marks[1] > marks[0] ? 1 : -1;
+  std::array<std::int64_t, kMarksForZero> position{};
   std::optional<std::int64_t> expected;
 
-  for (std::size_t i = 0; i + 1 < kMarksForDatum; ++i) {
-    const double apart = (marks[i + 1] - marks[i]) * datum.direction;
+  for (std::size_t i = 0; i + 1 < kMarksForZero; ++i) {
+    const double apart = (marks[i + 1] - marks[i]) * zero.direction;
     if (apart <= 0.0) return tl::unexpected(MarkFault::Reversed);
     const double whole = std::round(apart);
     if (std::abs(apart - whole) > kMostFraction) return tl::unexpected(MarkFault::NotWhole);
     const auto M = static_cast<std::int64_t>(whole);
-    const auto P = first_mark(code, M, datum.direction);
+    const auto P = first_mark(code, M, zero.direction);
     if (!P) return tl::unexpected(MarkFault::NotOfCode);
     if (expected && on_circle(code, *expected) != *P) return tl::unexpected(MarkFault::Disagree);
     // The position is not reduced modulo the circle, because the offsets of the four marks must be
     // comparable.
     position[i] = expected ? *expected : *P;
-    expected = position[i] + datum.direction * M;
+    expected = position[i] + zero.direction * M;
   }
 
   position.back() = *expected;
-  datum.first_mark = position[0];
+  zero.first_mark = position[0];
   double low = 0.0;
   double high = 0.0;
 
-  for (std::size_t i = 0; i < kMarksForDatum; ++i) {
+  for (std::size_t i = 0; i < kMarksForZero; ++i) {
     const double offset = static_cast<double>(position[i]) - marks[i];
     low = i == 0 ? offset : std::min(low, offset);
     high = i == 0 ? offset : std::max(high, offset);
-    datum.offset_periods += offset / static_cast<double>(kMarksForDatum);
+    zero.offset_periods += offset / static_cast<double>(kMarksForZero);
   }
 
-  datum.spread_periods = high - low;
-  return datum;
+  zero.spread_periods = high - low;
+  return zero;
 }
 
 }  // namespace abbe::drivers

@@ -41,7 +41,7 @@ void MarkTraverse::follow(double position) noexcept {
 }
 
 void MarkTraverse::keep(double position) noexcept {
-  if (count_ == kMarksForDatum) {
+  if (count_ == kMarksForZero) {
     std::copy(marks_.begin() + 1, marks_.end(), marks_.begin());
     --count_;
   }
@@ -52,7 +52,7 @@ tl::unexpected<MarkFault> MarkTraverse::refuse(MarkFault fault) noexcept {
   return tl::unexpected(++refusals_ >= options_.most_refusals ? MarkFault::WrongScale : fault);
 }
 
-std::optional<tl::expected<MarkDatum, MarkFault>> MarkTraverse::on_mark(
+std::optional<tl::expected<MarkZero, MarkFault>> MarkTraverse::on_mark(
     std::int64_t count) noexcept {
   const double position = static_cast<double>(count) / options_.counts_per_period;
   follow(position);
@@ -62,23 +62,23 @@ std::optional<tl::expected<MarkDatum, MarkFault>> MarkTraverse::on_mark(
     count_ = 0;
     keep(position);
     if (!lost) return std::nullopt;
-    return tl::expected<MarkDatum, MarkFault>{tl::unexpected(MarkFault::Reversed)};
+    return tl::expected<MarkZero, MarkFault>{tl::unexpected(MarkFault::Reversed)};
   }
 
   keep(position);
-  if (count_ < kMarksForDatum) return std::nullopt;
-  auto datum = datum_of(options_.code, marks_);
+  if (count_ < kMarksForZero) return std::nullopt;
+  auto zero = zero_of(options_.code, marks_);
 
-  if (!datum) {
+  if (!zero) {
     // One of the four marks is wrong, and which one is unknown: keep only the latest, as the first
     // of the next four.
     count_ = 0;
     keep(position);
-    return tl::expected<MarkDatum, MarkFault>{refuse(datum.error())};
+    return tl::expected<MarkZero, MarkFault>{refuse(zero.error())};
   }
 
   refusals_ = 0;
-  return datum;
+  return zero;
 }
 
 }  // namespace abbe::drivers

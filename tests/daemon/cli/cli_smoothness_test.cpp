@@ -1,4 +1,4 @@
-// `abbe identify otf --smoothness` and [otf] smoothness, on a run of a simulated machine.
+// `abbe identify otf --smoothness-um` and [otf] smoothness, on a run of a simulated machine.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -43,7 +43,7 @@ class CliSmoothness : public ::testing::Test {
 
 /// Three nodes 60 mm apart: 14 tables with one bend each, of 10 um and 30 urad.
 TEST_F(CliSmoothness, StatesThePriorThatWasUsed) {
-  const auto ran = identify("--smoothness 20 --json");
+  const auto ran = identify("--smoothness-um 20 --json");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
   const auto& prior = summary.at("smoothness");
@@ -57,7 +57,7 @@ TEST_F(CliSmoothness, StatesThePriorThatWasUsed) {
 TEST_F(CliSmoothness, TakesItsSizeFromTheConfiguration) {
   test::write_text(folder_ / "machine.toml",
                    test::synthetic_machine_toml() + "[otf]\nsmoothness_um = [20, 0, 30]\n");
-  const auto configured = identify("", "text"), off = identify("--smoothness none", "off");
+  const auto configured = identify("", "text"), off = identify("--smoothness-um none", "off");
   test::write_text(folder_ / "machine.toml", test::synthetic_machine_toml());
   EXPECT_THAT(configured.out, HasSubstr("smoothness  prior 20 um (X), none (Y), 30 um (Z)"));
   EXPECT_EQ(off.exit, 0) << off.err;
@@ -65,14 +65,14 @@ TEST_F(CliSmoothness, TakesItsSizeFromTheConfiguration) {
 }
 
 TEST_F(CliSmoothness, NamesErrorsThatAreRougher) {
-  const auto ran = identify("--smoothness 0.1");
+  const auto ran = identify("--smoothness-um 0.1");
   EXPECT_THAT(ran.out + ran.err, HasSubstr("not as smooth as the prior: EZZ at 0 mm"));
   EXPECT_THAT(ran.out, HasSubstr("left out: 12"));
 }
 
 TEST_F(CliSmoothness, RefusesWhatIsNoSize) {
   for (const char* text : {"-1", "0", "1,2", "1,2,x", "1e9", "nan", "estimated", "0,0,0"}) {
-    const auto ran = identify(std::string("--smoothness=") + text, "none");
+    const auto ran = identify(std::string("--smoothness-um=") + text, "none");
     EXPECT_EQ(ran.exit, 2) << text;
     EXPECT_THAT(ran.err, HasSubstr("must be none, or the standard deviation")) << text;
   }

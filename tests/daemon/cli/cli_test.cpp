@@ -399,7 +399,7 @@ TEST_F(Cli, CorrectsCommandsByTheErrorAtTheCorrectedPlace) {
 
 TEST_F(Cli, RefusesAToolTheModelDoesNotHoldFor) {
   const auto points = write("one.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
-  const auto ran = abbe(fmt::format("model eval '{}' --points '{}' --tool -20,0,-200",
+  const auto ran = abbe(fmt::format("model eval '{}' --points '{}' --tool-mm -20,0,-200",
                                     (folder_ / "out/model.json").string(), points.string()));
   EXPECT_EQ(ran.exit, 1);
   EXPECT_THAT(ran.out, IsEmpty());

@@ -184,13 +184,13 @@ TEST_F(CliExport, RefusesWrongOptionsByName) {
   EXPECT_THAT(message("--to siemens-lec --axis-map X=Y1"), HasSubstr("must be different"));
   EXPECT_THAT(message("--to csv-grid --axis-map X=A"), HasSubstr("no names of axes"));
   EXPECT_THAT(message("--to linuxcnc-comp --positive plus"), HasSubstr("is fixed"));
-  EXPECT_THAT(message("--to linuxcnc-comp --step 1"), HasSubstr("601 nodes on axis X"));
-  EXPECT_THAT(message("--to csv-grid --step 0"), HasSubstr("must be positive"));
-  EXPECT_THAT(message("--to csv-grid --step nan"), HasSubstr("must be finite"));
-  EXPECT_THAT(message("--to csv-grid --step 0.5"), HasSubstr("nodes of the grid"));
-  EXPECT_THAT(message("--to csv-grid --volume=-300,300,-300,300,-400,0"),
+  EXPECT_THAT(message("--to linuxcnc-comp --step-mm 1"), HasSubstr("601 nodes on axis X"));
+  EXPECT_THAT(message("--to csv-grid --step-mm 0"), HasSubstr("must be positive"));
+  EXPECT_THAT(message("--to csv-grid --step-mm nan"), HasSubstr("must be finite"));
+  EXPECT_THAT(message("--to csv-grid --step-mm 0.5"), HasSubstr("nodes of the grid"));
+  EXPECT_THAT(message("--to csv-grid --volume-mm=-300,300,-300,300,-400,0"),
               HasSubstr("Z -400 to 0 mm; the model is valid from -400 to -100 mm"));
-  EXPECT_THAT(message("--to csv-grid --volume 1,2,3"), HasSubstr("xmin,xmax,ymin"));
+  EXPECT_THAT(message("--to csv-grid --volume-mm 1,2,3"), HasSubstr("xmin,xmax,ymin"));
   EXPECT_THAT(message("--to isg-csv --direction +,+,+"), HasSubstr("is not a grid"));
 }
 
@@ -242,7 +242,7 @@ TEST_F(CliExport, ReplacesNoDeviceAndNoFolder) {
 }
 
 TEST_F(CliExport, RefusesAToolOfAnotherModel) {
-  const auto ran = abbe("model.json --to siemens-lec --tool 0,0,0 -o out");
+  const auto ran = abbe("model.json --to siemens-lec --tool-mm 0,0,0 -o out");
   EXPECT_EQ(ran.exit, 1);
   EXPECT_THAT(ran.err, HasSubstr("tool offset (0, 0, 0) mm"));
 }

@@ -229,7 +229,7 @@ TEST_F(MfbCli, WritesAModelThatEveryToolMayUse) {
   const auto tables = tables_in(shared("tables.csv"));
   for (const Vector3& t_mm : {Vector3(0, 0, -150), Vector3(30, -20, -90)}) {
     const auto eval =
-        abbe_shared(fmt::format("model eval kept_out/model.json --points at.csv --tool={},{},{}",
+        abbe_shared(fmt::format("model eval kept_out/model.json --points at.csv --tool-mm={},{},{}",
                                 t_mm.x(), t_mm.y(), t_mm.z()));
     ASSERT_EQ(eval.exit, 0) << eval.err;
     const auto row = test::rows_of(eval.out).at(0);

@@ -28,9 +28,9 @@ class OptionValues : public ::testing::Test {
 };
 
 TEST_F(OptionValues, AWholeNumberIsDecimal) {
-  const std::string otf = "identify otf --machine m --path p --tracker t -o o --block-samples ";
+  const std::string otf = "identify otf --machine m --path p --tracker t -o o --segment-samples ";
   for (const std::string value : {"010", "0xa", "0x10", "+-5", "1e1", "-3", "1_000", "''", "1,5"})
-    expect_usage_error(otf + value, "--block-samples");
+    expect_usage_error(otf + value, "--segment-samples");
 }
 
 TEST_F(OptionValues, AnotherNumberIsDecimalAndFinite) {
@@ -41,6 +41,22 @@ TEST_F(OptionValues, AnotherNumberIsDecimalAndFinite) {
 TEST_F(OptionValues, AnEmptyValueIsNotAnAbsentOption) {
   expect_usage_error("model compare a --measured ''", "empty");
   expect_usage_error("replay run.mcap --config ''", "--config: empty, needs a value");
+}
+
+TEST_F(OptionValues, TheUnitOfAnOptionMayBeLeftOut) {
+  expect_usage_error("export m.json --format heidenhain --step ten -o out", "--step-mm");
+  expect_usage_error("export m.json --format heidenhain --step=ten -o out", "--step-mm");
+  expect_usage_error("export m.json --format heidenhain --stepp 10 -o out", "--stepp");
+  // "--length" is no option of this command, with a unit or without.
+  expect_usage_error("export m.json --format heidenhain --length 10 -o out", "--length");
+}
+
+TEST_F(OptionValues, EarlierNamesAreRead) {
+  const std::string otf = "identify otf --machine m --path p --tracker t -o o ";
+  expect_usage_error(otf + "--block-samples ten", "--segment-samples");
+  const auto ran = test::run_abbe(folder_.path(), otf + "--estimator joint");
+  EXPECT_EQ(ran.exit, 4) << "the file m is missing; " << ran.err;
+  EXPECT_THAT(ran.err, testing::Not(HasSubstr("--estimator")));
 }
 
 TEST_F(OptionValues, EveryProgramChecksThem) {

@@ -21,8 +21,8 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr const char* kStar =
-    " --stylus=0,0,-150 --stylus=-100,0,-150 --stylus=100,0,-150 --stylus=0,-100,-150 "
-    "--stylus=0,100,-150 ";
+    " --stylus-mm=0,0,-150 --stylus-mm=-100,0,-150 --stylus-mm=100,0,-150 --stylus-mm=0,-100,-150 "
+    "--stylus-mm=0,100,-150 ";
 
 class PlanMfb : public ::testing::Test {
  protected:
@@ -105,7 +105,7 @@ TEST_F(PlanMfb, APlanForAnotherTravelIsNamed) {
 }
 
 TEST_F(PlanMfb, NamesTheStyliThatAreMissingAndWritesNothing) {
-  const auto ran = plan("--stylus=0,0,-150 --stylus=100,0,-150 -o p.toml");
+  const auto ran = plan("--stylus-mm=0,0,-150 --stylus-mm=100,0,-150 -o p.toml");
   EXPECT_EQ(ran.exit, 1);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("cannot show"), HasSubstr("EBZ"),
                              HasSubstr("Z1 from the second side: no stylus has its stem along -X"),
@@ -147,17 +147,19 @@ TEST_P(PlanMfbInput, IsRefused) {
 INSTANTIATE_TEST_SUITE_P(
     Faults, PlanMfbInput,
     ::testing::Values(
-        BadBarPlan{"", 2, "needs the styli, for example --stylus=0,0,-150"},
-        BadBarPlan{"--stylus=0,0,deep", 2, "--stylus \"0,0,deep\": must be x,y,z in mm"},
-        BadBarPlan{"--stylus=0,0,-150,-w", 2, "the direction of the stem"},
-        BadBarPlan{"--stylus=0,0,-150 --stylus=0,0,-150", 3, "two styli have the tool offset"},
-        BadBarPlan{"--stylus=0,0,-150 --tip-radius-mm 9", 3, "does not fit into holes"},
-        BadBarPlan{"--stylus=0,0,-150 --set best", 2, "--set"},
-        BadBarPlan{"--stylus=0,0,-150 --set indexed --rotary-at 1,2", 2, "--rotary-at \"1,2\""},
-        BadBarPlan{"--stylus=0,0,-150 --check p.toml", 2, "excludes"},
+        BadBarPlan{"", 2, "needs the styli, for example --stylus-mm=0,0,-150"},
+        BadBarPlan{"--stylus-mm=0,0,deep", 2, "--stylus-mm \"0,0,deep\": must be x,y,z in mm"},
+        BadBarPlan{"--stylus-mm=0,0,-150,-w", 2, "the direction of the stem"},
+        BadBarPlan{"--stylus-mm=0,0,-150 --stylus-mm=0,0,-150", 3,
+                   "two styli have the tool offset"},
+        BadBarPlan{"--stylus-mm=0,0,-150 --tip-radius-mm 9", 3, "does not fit into holes"},
+        BadBarPlan{"--stylus-mm=0,0,-150 --set best", 2, "--set"},
+        BadBarPlan{"--stylus-mm=0,0,-150 --set indexed --rotary-at-mm 1,2", 2,
+                   "--rotary-at-mm \"1,2\""},
+        BadBarPlan{"--stylus-mm=0,0,-150 --check p.toml", 2, "excludes"},
         BadBarPlan{"--check none.toml", 4, "none.toml"},
         BadBarPlan{"--check bar.toml", 3, "bar.toml"},
-        BadBarPlan{"--stylus=0,0,-150 --stylus=0,400,-150 --stylus=0,-400,-150", 1,
+        BadBarPlan{"--stylus-mm=0,0,-150 --stylus-mm=0,400,-150 --stylus-mm=0,-400,-150", 1,
                    "use styli with shorter arms"}));
 
 /// A plan as the writer gets it, for a bar that expands.

@@ -1,4 +1,4 @@
-/// `abbe identify otf --target`: three runs of a simulated machine with the reflector at three
+/// `abbe identify otf --target-mm`: three runs of a simulated machine with the reflector at three
 /// offsets, as files. The machine is that of the simulator (exact transforms).
 
 #include <fmt/format.h>
@@ -58,7 +58,7 @@ class TargetsCli : public ::testing::Test {
                       const std::string& more = "") {
     std::string text =
         fmt::format("identify otf --machine machine.toml --path path.csv -o {} {}", out, more);
-    for (const auto& target : targets) text += fmt::format(" --target={}", target);
+    for (const auto& target : targets) text += fmt::format(" --target-mm={}", target);
     return test::run_abbe(folder_, text);
   }
 
@@ -69,7 +69,7 @@ const std::vector<std::string> kThreeTargets{"20,-15,-120=t0.csv", "170,-15,-120
                                              "20,135,-170=t2.csv"};
 
 TEST_F(TargetsCli, DetermineAll18TablesForAnyTool) {
-  const auto ran = identify(kThreeTargets, "all", "--estimator joint --json");
+  const auto ran = identify(kThreeTargets, "all", "--estimator simultaneous --json");
   ASSERT_EQ(ran.exit, 0) << ran.out << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
   EXPECT_EQ(summary["unknowns"].get<int>() - summary["rank"].get<int>(), 24);

@@ -51,10 +51,23 @@ TEST(OtfPath, WithBacklashMustMoveEveryAxis) {
 }
 
 TEST(OtfInputs, TheConfigurationNamesTheEstimator) {
-  for (const auto estimator : {OtfEstimator::TwoStep, OtfEstimator::Joint}) {
+  for (const auto estimator : {OtfEstimator::TwoStep, OtfEstimator::Simultaneous}) {
     const OtfConfig otf{.estimator = estimator};
     EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = otf}).estimator, calib_of(estimator));
   }
+}
+
+TEST(OtfInputs, TheEarlierWordOfTheEstimatorIsRead) {
+  const auto config = [](const std::string& word) {
+    return parse_config(test::synthetic_machine_toml() + "[otf]\nestimator = \"" + word + "\"\n",
+                        "machine.toml");
+  };
+  EXPECT_EQ(config("joint")->otf.estimator, OtfEstimator::Simultaneous);
+  const auto refused = config("both");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              testing::ElementsAre(HasSubstr("must be one of \"two-step\", "
+                                             "\"simultaneous\"")));
 }
 
 TEST(OtfInputs, TheConfigurationNamesTheFormOfBacklash) {

@@ -162,11 +162,11 @@ TEST(RunFiguresOtf, AreThoseOfTheRowsOfTheRun) {
   const ModelDocument document = otf_document(run.candidate, {}, {}, {});
   const auto& rows = run.found.observations.rows;
   const auto& after_m = run.found.solution.residuals.after_m;
-  const auto& block_s = run.found.observations.block_s;
+  const auto& segment_s = run.found.observations.segment_s;
   double begin_s = 1e9, end_s = -1e9;
   for (const auto& row : rows) {
-    begin_s = std::min(begin_s, block_s.at(row.block));
-    end_s = std::max(end_s, block_s.at(row.block));
+    begin_s = std::min(begin_s, segment_s.at(row.segment));
+    end_s = std::max(end_s, segment_s.at(row.segment));
   }
 
   std::size_t all = 0;
@@ -179,8 +179,8 @@ TEST(RunFiguresOtf, AreThoseOfTheRowsOfTheRun) {
       ++count;
       of_leg += after_m[i] * after_m[i];
       largest = std::max(largest, std::abs(after_m[i]));
-      first = std::min(first, block_s[rows[i].block] - begin_s);
-      last = std::max(last, block_s[rows[i].block] - begin_s);
+      first = std::min(first, segment_s[rows[i].segment] - begin_s);
+      last = std::max(last, segment_s[rows[i].segment] - begin_s);
     }
     EXPECT_EQ(part.count, count) << part.name;
     EXPECT_NEAR(part.after_rms_m, std::sqrt(of_leg / static_cast<double>(count)), 1e-15);
@@ -198,7 +198,7 @@ TEST(RunFiguresOtf, AreThoseOfTheRowsOfTheRun) {
               0.01 * tests::otf::MadeRunOptions{}.speed_m_s);
 }
 
-TEST(RunFiguresOtf, TheSeriesHasTheResidualOfEachRowAtTheTimeOfItsBlock) {
+TEST(RunFiguresOtf, TheSeriesHasTheResidualOfEachRowAtTheTimeOfItsSegment) {
   const Identified run = identified();
   const ModelDocument document = otf_document(run.candidate, {}, {}, {});
   const auto& o = run.found.observations;
@@ -206,12 +206,12 @@ TEST(RunFiguresOtf, TheSeriesHasTheResidualOfEachRowAtTheTimeOfItsBlock) {
   EXPECT_TRUE(series.over_time);
   EXPECT_EQ(series.count, o.rows.size());
   double begin_s = 1e9;
-  for (const auto& row : o.rows) begin_s = std::min(begin_s, o.block_s[row.block]);
+  for (const auto& row : o.rows) begin_s = std::min(begin_s, o.segment_s[row.segment]);
   for (const auto& point : series.points) {
     bool found = false;
     for (std::size_t i = 0; i < o.rows.size() && !found; ++i)
       found = run.found.solution.residuals.after_m[i] == point.after_m &&
-              std::abs(o.block_s[o.rows[i].block] - begin_s - point.at) < 1e-9;
+              std::abs(o.segment_s[o.rows[i].segment] - begin_s - point.at) < 1e-9;
     EXPECT_TRUE(found) << point.at;
   }
 }

@@ -166,6 +166,18 @@ TEST(ModelDocument, ReadsTheEarlierNameOfTheVarianceFactor) {
   EXPECT_EQ(read->statistics, document.statistics);
 }
 
+TEST(ModelDocument, ReadsTheEarlierNamesOfTheDatum) {
+  const auto document = synthetic_document(2);
+  auto text = to_json(document);
+  const std::string name = "\"datum\"";
+  ASSERT_NE(text.find(name), std::string::npos);
+  text.replace(text.find(name), name.size(), "\"gauge\"");
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_EQ(read->model.datum(), document.model.datum());
+  EXPECT_EQ(model_hash(*read), model_hash(document));
+}
+
 TEST(ModelDocument, WritesTheSameBytesAgain) {
   const auto text = to_json(synthetic_document(3));
   const auto read = parse_model(text, "model.json");
@@ -286,7 +298,7 @@ TEST(ModelDocument, IsRefusedWithACovarianceThatIsNotPositive) {
       2.0 * std::sqrt(covariance(i, i) * covariance(i + 1, i + 1));
   auto changed = document;
   changed.model =
-      calib::VolumetricModel::from_vector(document.model.tables()->layout(), document.model.gauge(),
+      calib::VolumetricModel::from_vector(document.model.tables()->layout(), document.model.datum(),
                                           document.model.tool_offsets_m(), document.model.U(),
                                           covariance, document.model.validity())
           .value();
@@ -353,13 +365,13 @@ TEST(ModelDocument, KeepsThePlaceOfTheTracker) {
 
 TEST(ModelDocument, ReportsEveryFaultAtOnce) {
   auto text = to_json(synthetic_document(8));
-  text = replaced(text, "\"gauge\": \"G1\"", "\"gauge\": \"G7\"");
+  text = replaced(text, "\"datum\": \"G1\"", "\"datum\": \"G7\"");
   text = replaced(text, "\"squareness\": \"travel\"", "\"squareness\": 1");
   text = replaced(text, "\"sigma0\"", "\"sigma1\"");
   const auto read = parse_model(text, "model.json");
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().details,
-              ::testing::IsSupersetOf({HasSubstr("model.json: gauge: must be \"G1\""),
+              ::testing::IsSupersetOf({HasSubstr("model.json: datum: must be \"G1\""),
                                        HasSubstr("squareness: must be a string"),
                                        HasSubstr("statistics.sigma0: missing")}));
 }

@@ -78,7 +78,7 @@ TEST(CubicModelDocument, IsRefusedWithAKindThatThisVersionDoesNotKnow) {
 TEST(CubicModelMessages, StateTheErrorOfLinearInterpolation) {
   const PublishedModel model{.id = "m",
                              .method = "otf",
-                             .estimator = "joint",
+                             .estimator = "simultaneous",
                              .recording_sha256 = {},
                              .model = document_of(Interpolation::NaturalCubic).model};
   EXPECT_EQ(model_message(model, {}).basis(), "cubic");

@@ -37,7 +37,7 @@ calib::VolumetricModel of_half_the_volume() {
     corners.emplace_back((i & 1) != 0 ? 0.0 : -0.3, (i & 2) != 0 ? 0.3 : -0.3,
                          (i & 4) != 0 ? -0.1 : -0.4);
   }
-  return calib::VolumetricModel::from_vector(whole.tables()->layout(), whole.gauge(),
+  return calib::VolumetricModel::from_vector(whole.tables()->layout(), whole.datum(),
                                              whole.tool_offsets_m(), whole.U(), whole.covariance(),
                                              calib::ValidityVolume::hull_of(corners).value())
       .value();

@@ -7,7 +7,7 @@
 #include <iterator>
 #include <set>
 
-#include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/replay/replay.hpp"
 #include "config_tables.hpp"
 #include "recording_fixture.hpp"
@@ -44,8 +44,8 @@ class FurtherFiles : public ::testing::Test {
     sample.missing_mask = unknown;
     recorder_->record(sample, "counter_card");
   }
-  void find_datum(std::size_t axis, double reading_at_zero, HostTime from) {
-    recorder_->attach(to_attachment(FoundDatum{axis, reading_at_zero, 0.0, from}), from);
+  void find_zero(std::size_t axis, double reading_at_zero, HostTime from) {
+    recorder_->attach(to_attachment(FoundZero{axis, reading_at_zero, 0.0, from}), from);
   }
   RecordingReader second() {
     if (!recorder_->close()) throw std::runtime_error("close");
@@ -68,12 +68,12 @@ class FurtherFiles : public ::testing::Test {
     EXPECT_TRUE(replay(reader, *config, options));
     return times;
   }
-  /// reading_at_zero of the datums handed on, in order.
-  static std::vector<double> datums_of(const RecordingReader& reader) {
-    std::vector<double> datums;
+  /// reading_at_zero of the zeros handed on, in order.
+  static std::vector<double> zeros_of(const RecordingReader& reader) {
+    std::vector<double> zeros;
     for (const auto& a : reader.attachments())
-      if (a.name == kDatumName) datums.push_back(datum_from_attachment(a)->reading_at_zero);
-    return datums;
+      if (a.name == kZeroName) zeros.push_back(zero_from_attachment(a)->reading_at_zero);
+    return zeros;
   }
 
   TemporaryFolder folder_;
@@ -181,35 +181,35 @@ TEST_F(FurtherFiles, BeginWithAWholeCycle) {
   EXPECT_EQ(turns.size(), 3u);
 }
 
-TEST_F(FurtherFiles, CarryOverTheValidDatumsOnly) {
+TEST_F(FurtherFiles, CarryOverTheValidZerosOnly) {
   recorder_->attach(reference_request(example_time(1)), example_time(1));
-  find_datum(0, 0.1, example_time(1));
-  find_datum(0, 0.2, example_time(2));
-  find_datum(1, 0.3, example_time(3));
+  find_zero(0, 0.1, example_time(1));
+  find_zero(0, 0.2, example_time(2));
+  find_zero(1, 0.3, example_time(3));
   record_axes(5, 0b110);  // Y and Z: the card restarted
   recorder_->flush();
   record_axes(6, 0b110);
   const auto reader = second();
 
-  EXPECT_THAT(datums_of(reader), ElementsAre(0.2));
+  EXPECT_THAT(zeros_of(reader), ElementsAre(0.2));
   std::vector<std::string> names;
   for (const auto& a : reader.attachments()) names.push_back(a.name);
-  EXPECT_THAT(names, ElementsAre(kDatumStateName, kDatumName));
-  const auto state = datum_state_from_attachment(reader.attachments().front());
+  EXPECT_THAT(names, ElementsAre(kZeroStateName, kZeroName));
+  const auto state = zero_state_from_attachment(reader.attachments().front());
   ASSERT_TRUE(state) << state.error().text;
   EXPECT_EQ(state->at, example_time(5));
   EXPECT_EQ(state->unknown, 0b110);
 }
 
-TEST_F(FurtherFiles, CarryOverDatumsFoundSinceTheLastSample) {
-  find_datum(0, 0.1, example_time(1));
+TEST_F(FurtherFiles, CarryOverZerosFoundSinceTheLastSample) {
+  find_zero(0, 0.1, example_time(1));
   record_axes(5, 0b110);
-  find_datum(1, 0.2, example_time(5));  // what waited fills the first file
+  find_zero(1, 0.2, example_time(5));  // what waited fills the first file
   record_axes(5, 0b110);
   recorder_->flush();
   record_axes(6, 0b100);
-  EXPECT_THAT(datums_of(second()), ElementsAre(0.1, 0.2));
-  EXPECT_THAT(datums_of(read("run-3.mcap")), ElementsAre(0.1, 0.2));
+  EXPECT_THAT(zeros_of(second()), ElementsAre(0.1, 0.2));
+  EXPECT_THAT(zeros_of(read("run-3.mcap")), ElementsAre(0.1, 0.2));
 }
 
 /// A recording of a card that restarted while its axes moved, in files of some messages each.
@@ -279,7 +279,7 @@ TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesOfTheLiveRun) {
   for (std::uint32_t n = 2; exists(n); ++n) {
     const auto reader = file(n);
     if (reader.attachments().empty()) continue;  // no data of the card yet
-    begun_with.insert(datum_state_from_attachment(reader.attachments().front())->unknown);
+    begun_with.insert(zero_state_from_attachment(reader.attachments().front())->unknown);
     const auto live = samples(reader, ReplaySource::Samples);
     for (const auto& again : samples(reader, ReplaySource::RawBytes)) {
       const auto after = std::ranges::lower_bound(live, again.head.time, {}, time_of);
@@ -298,32 +298,32 @@ TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesOfTheLiveRun) {
 }
 
 /// Whether the axes are missing in a sample at `t` after the file began.
-std::uint8_t missing_after(const DatumState& state, const std::vector<FoundDatum>& found,
+std::uint8_t missing_after(const ZeroState& state, const std::vector<FoundZero>& found,
                            bool restarted) {
   const auto config = parse_config(kTrackerMill, "abbed.toml");
   EXPECT_TRUE(config);
-  Datum datum{*config};
-  datum.go_on(state);
-  for (const auto& f : found) datum.found(f);
+  AxisZeros zero{*config};
+  zero.go_on(state);
+  for (const auto& f : found) zero.found(f);
   Batch batch;
   auto& sample = batch.axes.emplace_back();
   sample.head.time = state.at + 1s;
   sample.axis_count = 3;
   if (restarted) sample.head.flags |= protocol::SampleFlag::Restarted;
-  datum.apply(batch);
+  zero.apply(batch);
   return batch.axes[0].missing_mask;
 }
 
-TEST(DatumState, AnUnreferencedAxisStaysUnreferencedInTheNextFile) {
+TEST(ZeroState, AnUnreferencedAxisStaysUnreferencedInTheNextFile) {
   EXPECT_EQ(missing_after({HostTime{10s}, 0b010}, {}, false), 0b010);
   EXPECT_EQ(missing_after({HostTime{10s}, 0b000}, {}, false), 0b000);
 }
 
-TEST(DatumState, NoSetUpIsTheFirstInAFurtherFile) {
+TEST(ZeroState, NoSetUpIsTheFirstInAFurtherFile) {
   EXPECT_EQ(missing_after({HostTime{10s}, 0b000}, {}, true), 0b111);
 }
 
-TEST(DatumState, ADatumFoundLaterIsApplied) {
+TEST(ZeroState, AZeroFoundLaterIsApplied) {
   EXPECT_EQ(missing_after({HostTime{10s}, 0b110}, {{.axis = 1, .from = HostTime{10s}}}, false),
             0b100);
 }

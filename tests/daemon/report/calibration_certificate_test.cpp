@@ -246,8 +246,8 @@ TEST(CalibrationCertificate, OfARefusedModelIsRefusedUnlessForcedAndThenStatesIt
   EXPECT_EQ(schema_faults(text), "");
   const auto statements = text.find("<dcc:statements>");
   ASSERT_NE(statements, std::string::npos);
-  EXPECT_LT(text.find("larger by 418 um/m", statements), text.find(">Gauge<"));
-  EXPECT_LT(text.find("forced by anna", statements), text.find(">Gauge<"));
+  EXPECT_LT(text.find("larger by 418 um/m", statements), text.find(">Datum<"));
+  EXPECT_LT(text.find("forced by anna", statements), text.find(">Datum<"));
   EXPECT_THAT(text, HasSubstr("customer insists"));
 }
 

@@ -50,8 +50,8 @@ Counting some_counting() {
   counting.progress.axis_count = 3;
   counting.progress.count = {1, -2, 3};
   counting.progress.set_serial_number("01ABBE08");
-  counting.datum = {{.axis = 0, .reading_at_zero = 0.1 + 1e-17, .u = 1e-6},
-                    {.axis = 2, .reading_at_zero = -0.3, .u = 1e-4, .stated = true}};
+  counting.zero = {{.axis = 0, .reading_at_zero = 0.1 + 1e-17, .u = 1e-6},
+                   {.axis = 2, .reading_at_zero = -0.3, .u = 1e-4, .stated = true}};
   return counting;
 }
 
@@ -78,9 +78,9 @@ TEST_F(LeftCountingTest, ReadsBackTheStoredState) {
   EXPECT_EQ(progress.clock_count, (std::int64_t{1} << 33) + 5);
   EXPECT_EQ(progress.count, some_counting().progress.count);
   EXPECT_EQ(progress.serial_number(), "01ABBE08");
-  ASSERT_EQ(left.state->counting.datum.size(), 2u);
-  EXPECT_EQ(left.state->counting.datum[0].reading_at_zero, 0.1 + 1e-17);
-  EXPECT_TRUE(left.state->counting.datum[1].stated);
+  ASSERT_EQ(left.state->counting.zero.size(), 2u);
+  EXPECT_EQ(left.state->counting.zero[0].reading_at_zero, 0.1 + 1e-17);
+  EXPECT_TRUE(left.state->counting.zero[1].stated);
 }
 
 TEST_F(LeftCountingTest, WithoutAFileReportsNothing) {
@@ -142,7 +142,7 @@ protocol::AxisSample counted_sample(HostTime at, bool restarted = false) {
   return sample;
 }
 
-TEST(ReferenceAfterARestart, RestoresTheDatumOfACardThatKeptCounting) {
+TEST(ReferenceAfterARestart, RestoresTheZeroOfACardThatKeptCounting) {
   const auto config = card_config();
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
@@ -154,7 +154,7 @@ TEST(ReferenceAfterARestart, RestoresTheDatumOfACardThatKeptCounting) {
   EXPECT_THAT(service.carried_on(), ElementsAre("X", "Z"));
 }
 
-TEST(ReferenceAfterARestart, DropsTheDatumOfACardThatRestarted) {
+TEST(ReferenceAfterARestart, DropsTheZeroOfACardThatRestarted) {
   const auto config = card_config();
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
@@ -179,7 +179,7 @@ TEST(ReferenceAfterARestart, DropsTheProgressFromBeforeTheCountersRestarted) {
 
   cycle(counted_sample(HostTime{1s}, true), HostTime{1s});
   ASSERT_TRUE(service.counting());
-  EXPECT_EQ(service.counting()->datum.size(), 3u);
+  EXPECT_EQ(service.counting()->zero.size(), 3u);
   cycle(counted_sample(HostTime{5s}), HostTime{6s});  // of a scan that is not among the samples yet
 
   EXPECT_EQ(service.counting()->progress.head.time, HostTime{1s});
@@ -201,7 +201,7 @@ TEST(CountingStateThread, WritesAtTheLatestWhenItEnds) {
 
   const auto state = counting_state_from_text(test::text_of(file), "kept");
   ASSERT_TRUE(state) << state.error().text;
-  EXPECT_EQ(state->counting.datum.size(), 2u);
+  EXPECT_EQ(state->counting.zero.size(), 2u);
   EXPECT_THAT(faults, IsEmpty());
 }
 

@@ -79,8 +79,8 @@ double largest_difference_in_u(const LiveTables& live, const calib::VolumetricMo
   std::size_t i = 0;
   for (const LiveTable& table : live.tables) {
     for (std::size_t node = 0; node < table.value.size(); ++node, ++i) {
-      constexpr double kFixedByGauge = 1e-8;  // its u is 1e-9
-      const double u = std::max(table.u[node], kFixedByGauge);
+      constexpr double kFixedByDatum = 1e-8;  // its u is 1e-9
+      const double u = std::max(table.u[node], kFixedByDatum);
       EXPECT_EQ(parameters[i].name, table.name);
       largest = std::max(largest, std::abs(table.value[node] - parameters[i].value) / u);
     }
@@ -88,7 +88,7 @@ double largest_difference_in_u(const LiveTables& live, const calib::VolumetricMo
   return largest;
 }
 
-/// They differ by the samples near the corners, means of blocks, and the scatter of the alignment.
+/// They differ by the samples near the corners, means of chunks, and the scatter of the alignment.
 TEST(LiveTables, OfACompleteRunAgreeWithItsModel) {
   LiveRun run(500);
   run.drive();

@@ -424,7 +424,7 @@ TEST_F(DriftingMachine, ARunUpdatesTheActiveModelAndNamesBothParents) {
   const std::string second = model().model->id;
   EXPECT_NE(second, first);
   const auto document = store().load(second).value();
-  EXPECT_EQ(document.estimator, "joint, update");
+  EXPECT_EQ(document.estimator, "simultaneous, update");
   const auto& previous = document.inputs.back();
   EXPECT_EQ(previous.name, "previous model " + first);
   EXPECT_EQ(previous.sha256, model_hash(store().load(first).value()));

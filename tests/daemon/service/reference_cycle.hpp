@@ -7,7 +7,7 @@
 namespace abbe::daemon {
 
 inline void give(ReferenceService& service, Batch& batch) {
-  Pipeline pipeline{{}, &service.datum()};
+  Pipeline pipeline{{}, &service.zeros()};
   pipeline.add(service);
   pipeline.cycle(batch);
 }

@@ -151,7 +151,7 @@ TEST(ReferenceService, AReferencedAxisReadsTheMachinesPosition) {
   EXPECT_NEAR(service.status().at(0).reading_at_zero, Traverse::kLiveBegan_m, 5e-6);
 }
 
-TEST(ReferenceService, ACardThatRestartedHasNoDatum) {
+TEST(ReferenceService, ACardThatRestartedHasNoZero) {
   const auto config = reference_config_of(kCard + reference("tolerance_um = 5\n"));
   ReferenceService service{config, nullptr};
   ASSERT_TRUE(service.start());
@@ -198,21 +198,21 @@ void stand(ReferenceService& service, std::int64_t count) {
   }
 }
 
-SetDatumHere z_at(HostTime now) {
+SetZeroHere z_at(HostTime now) {
   return {.axes = {"Z"}, .now = now};
 }
 
-TEST(ReferenceService, AxesWithoutMarksAreUnreferencedUntilADatumIsSet) {
+TEST(ReferenceService, AxesWithoutMarksAreUnreferencedUntilAZeroIsSet) {
   const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
 
-  EXPECT_EQ(service.set_datum_here({}).error().code, ErrorCode::Refused);
+  EXPECT_EQ(service.set_zero_here({}).error().code, ErrorCode::Refused);
   stand(service, 400);
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y", "Z"));
   Batch batch = counts(HostTime{2s}, 400);
   give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
-  ASSERT_TRUE(service.set_datum_here(z_at(HostTime{2s})));
+  ASSERT_TRUE(service.set_zero_here(z_at(HostTime{2s})));
   batch = counts(HostTime{3s}, 404);
   give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b011);
@@ -221,56 +221,56 @@ TEST(ReferenceService, AxesWithoutMarksAreUnreferencedUntilADatumIsSet) {
   EXPECT_EQ(service.unknown(), service.without_zero()) << "no axis of this card has marks";
 }
 
-TEST(ReferenceService, RefusesToSetTheDatumOfAMovingAxis) {
+TEST(ReferenceService, RefusesToSetTheZeroOfAMovingAxis) {
   const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
   Batch batch = counts(HostTime{2s}, 440);
   give(service, batch);
-  const auto moving = service.set_datum_here(z_at(HostTime{2s}));
+  const auto moving = service.set_zero_here(z_at(HostTime{2s}));
 
   ASSERT_FALSE(moving);
   EXPECT_EQ(moving.error().code, ErrorCode::Refused);
   EXPECT_THAT(moving.error().text, HasSubstr("Z moves"));
   EXPECT_THAT(service.without_zero(), Contains("Z"));
-  EXPECT_TRUE(service.set_datum_here({.axes = {"X"}, .now = HostTime{2s}}));
+  EXPECT_TRUE(service.set_zero_here({.axes = {"X"}, .now = HostTime{2s}}));
   batch = counts(HostTime{2500ms}, 441);  // a count to and fro is no motion
   give(service, batch);
-  EXPECT_TRUE(service.set_datum_here(z_at(HostTime{2500ms})));
+  EXPECT_TRUE(service.set_zero_here(z_at(HostTime{2500ms})));
 }
 
-TEST(ReferenceService, RefusesToSetTheDatumWhileTheCardIsSilent) {
+TEST(ReferenceService, RefusesToSetTheZeroWhileTheCardIsSilent) {
   const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
-  const auto silent = service.set_datum_here(z_at(HostTime{2600ms}));
+  const auto silent = service.set_zero_here(z_at(HostTime{2600ms}));
   ASSERT_FALSE(silent);
   EXPECT_EQ(silent.error().code, ErrorCode::Refused);
   EXPECT_THAT(silent.error().text, HasSubstr("silent for 0.6 s"));
 }
 
-TEST(ReferenceService, NoDatumChangesDuringACalibration) {
+TEST(ReferenceService, NoZeroChangesDuringACalibration) {
   const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
   auto here = z_at(HostTime{2s});
   here.acquiring = true;
-  EXPECT_EQ(service.set_datum_here(here).error().code, ErrorCode::Refused);
+  EXPECT_EQ(service.set_zero_here(here).error().code, ErrorCode::Refused);
   here.acquiring = false;
-  EXPECT_TRUE(service.set_datum_here(here));
+  EXPECT_TRUE(service.set_zero_here(here));
 }
 
-TEST(ReferenceService, RefusesADatumWithoutUncertainty) {
+TEST(ReferenceService, RefusesAZeroWithoutUncertainty) {
   const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
   auto here = z_at(HostTime{2s});
   EXPECT_GT(here.u, 0.0);
   here.u = 0.0;
-  EXPECT_EQ(service.set_datum_here(here).error().code, ErrorCode::Usage);
+  EXPECT_EQ(service.set_zero_here(here).error().code, ErrorCode::Usage);
 }
 
-TEST(ReferenceService, AConfiguredDatumIsValidForTheFirstSetUpOnly) {
+TEST(ReferenceService, AConfiguredZeroIsValidForTheFirstSetUpOnly) {
   const auto config = reference_config_of(kCard.substr(0, kCard.find("axes")) + kHere +
                                           kCard.substr(kCard.find("axes")));
   ReferenceService service{config, nullptr};
@@ -295,27 +295,27 @@ TEST(ReferenceService, ItIsDecidedForEachAxis) {
   Batch batch = counts(HostTime{1s}, 0, true);
   give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b100);
-  EXPECT_EQ(service.set_datum_here(z_at(HostTime{1s})).error().code, ErrorCode::Usage);
+  EXPECT_EQ(service.set_zero_here(z_at(HostTime{1s})).error().code, ErrorCode::Usage);
 }
 
-TEST(Datum, IsTheSameFromTheRecording) {
-  const FoundDatum datum{.axis = 2,
-                         .reading_at_zero = 0.1 + 1e-17,
-                         .u = 1e-7,
-                         .from = HostTime{123456789ns},
-                         .stated = true};
-  const auto back = datum_from_attachment(to_attachment(datum));
+TEST(Zero, IsTheSameFromTheRecording) {
+  const FoundZero zero{.axis = 2,
+                       .reading_at_zero = 0.1 + 1e-17,
+                       .u = 1e-7,
+                       .from = HostTime{123456789ns},
+                       .stated = true};
+  const auto back = zero_from_attachment(to_attachment(zero));
   ASSERT_TRUE(back) << back.error().text;
-  EXPECT_EQ(back->axis, datum.axis);
-  EXPECT_EQ(back->reading_at_zero, datum.reading_at_zero);
-  EXPECT_EQ(back->u, datum.u);
-  EXPECT_EQ(back->from, datum.from);
-  EXPECT_EQ(back->stated, datum.stated);
+  EXPECT_EQ(back->axis, zero.axis);
+  EXPECT_EQ(back->reading_at_zero, zero.reading_at_zero);
+  EXPECT_EQ(back->u, zero.u);
+  EXPECT_EQ(back->from, zero.from);
+  EXPECT_EQ(back->stated, zero.stated);
 }
 
-TEST(Datum, AppliesToSamplesLaterThanItWasFound) {
-  Datum datum{reference_config_of(kCard + reference(""))};
-  datum.found({.axis = 2, .reading_at_zero = 0.3, .from = HostTime{10s}});
+TEST(Zero, AppliesToSamplesLaterThanItWasFound) {
+  AxisZeros zero{reference_config_of(kCard + reference(""))};
+  zero.found({.axis = 2, .reading_at_zero = 0.3, .from = HostTime{10s}});
   Batch batch;
 
   for (const auto t : {9s, 10s, 11s}) {
@@ -325,7 +325,7 @@ TEST(Datum, AppliesToSamplesLaterThanItWasFound) {
     sample.count[2] = 4;
   }
 
-  datum.apply(batch);
+  zero.apply(batch);
   EXPECT_EQ(batch.axes[1].missing_mask & 0b100, 0b100);
   EXPECT_EQ(batch.axes[2].missing_mask & 0b100, 0);
   EXPECT_DOUBLE_EQ(batch.axes[2].position[2], 0.3 - 1e-6);

@@ -102,7 +102,7 @@ TEST_F(AbbeDds, HelpListsTheExitCodes) {
 TEST_F(AbbeDds, WatchTakesItsDomainFromTheConfigurationAndReportsSilence) {
   write_config("systemd");
   Process watch({"/bin/sh", "-c", "exec \"$@\" 2>&1", "sh", ABBE_WATCH_PROGRAM, "-c", config,
-                 "--timeout", "6"});
+                 "--timeout-s", "6"});
   EXPECT_EQ(watch.wait_for_end(), 0);
   EXPECT_NE(
       watch.transcript().find("nothing received for 5 s in DDS domain " + domain_.text() +

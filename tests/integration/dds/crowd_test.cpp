@@ -51,7 +51,7 @@ TEST_F(DdsCrowd, TheParticipantsBeyondTheFirstHundredAreFoundToo) {
   const auto others = occupied(std::stoi(domain_.text()), kOthers);
   start_feeder();
   Process watcher({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", profile_,
-                   "--until-model", "--timeout", "30"});
+                   "--until-model", "--timeout-s", "30"});
   EXPECT_EQ(watcher.wait_for_end(std::chrono::seconds{40}), 0) << watcher.transcript();
   Process fast({ABBE_FAST_SUBSCRIBER, domain_.text(), profile_});
   EXPECT_TRUE(fast.wait_for("vmc-3: apply V")) << fast.transcript();

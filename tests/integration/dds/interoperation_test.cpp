@@ -69,7 +69,7 @@ TEST_F(DdsInteroperation, CycloneThatJoinsLateReadsModelAndGridFieldByField) {
   start_feeder();
   {
     // Another subscriber already has the model: it was published before the late one joins.
-    Process early(watch({"--until-model", "--timeout", "20"}));
+    Process early(watch({"--until-model", "--timeout-s", "20"}));
     ASSERT_EQ(early.wait_for_end(), 0) << early.transcript();
   }
   Process late({ABBE_CYCLONE_FIELDS_PROGRAM, domain_.text()});
@@ -107,7 +107,7 @@ TEST_F(DdsInteroperation, CycloneThatWaitsReadsTheModelWhenItComes) {
 
 TEST_F(DdsInteroperation, FastSubscriberReadsEveryFieldOfTheModel) {
   start_feeder();
-  Process process(watch({"--json", "--until-model", "--timeout", "20"}));
+  Process process(watch({"--json", "--until-model", "--timeout-s", "20"}));
   ASSERT_EQ(process.wait_for_end(), 0) << process.transcript();
   const auto line = process.wait_for(R"({"topic":"abbe/v1/ErrorModel")");
   ASSERT_TRUE(line.has_value());
@@ -135,7 +135,7 @@ TEST_F(DdsInteroperation, WatchComparesTheReceivedGridWithKnownErrors) {
   }
   start_feeder();
   const auto grid = directory_ / "grid.csv";
-  Process process(watch({"--json", "--timeout", "20", "--grid-csv", grid, "--compare", known}));
+  Process process(watch({"--json", "--timeout-s", "20", "--grid-csv", grid, "--compare", known}));
   ASSERT_EQ(process.wait_for_end(), 0) << process.transcript();
   const auto line = process.wait_for(R"({"comparison")");
   ASSERT_TRUE(line.has_value());
@@ -152,7 +152,7 @@ TEST_F(DdsInteroperation, WatchComparesTheReceivedGridWithKnownErrors) {
 }
 
 TEST_F(DdsInteroperation, WatchWithoutAPublisherReportsItAndEndsWithOne) {
-  Process process(watch({"--until-model", "--timeout", "0.3"}));
+  Process process(watch({"--until-model", "--timeout-s", "0.3"}));
   EXPECT_EQ(process.wait_for_end(), 1);
 }
 

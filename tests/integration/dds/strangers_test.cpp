@@ -112,9 +112,9 @@ TEST_F(StrangersWithSecurity, FakesAreIgnoredNoProcessEndsNothingIsLost) {
     Process rogue(stranger("fake", make_keys("rogue")));
     Process types(stranger("types"));
     Process garbage(stranger("garbage"));
-    Process reader(watch({"--until-model", "--timeout", seconds}));
+    Process reader(watch({"--until-model", "--timeout-s", seconds}));
     Process rogue_reader(
-        watch({"--until-model", "--timeout", seconds, "--security", directory_ / "rogue"}));
+        watch({"--until-model", "--timeout-s", seconds, "--security", directory_ / "rogue"}));
     for (Process* stranger : {&fake, &rogue, &types, &garbage})
       EXPECT_TRUE(stranger->wait_for("started"));
     const auto patience = std::chrono::seconds{20 + std::stoi(seconds)};
@@ -340,7 +340,7 @@ TEST_F(Strangers, AFakeGridBesideTheTrueOneIsIgnored) {
   start_feeder();
   ::unsetenv("ABBE_FEEDER_STALE");
   const auto csv = directory_ / "grid.csv";
-  Process watcher(watch({"--grid-csv", csv, "--timeout", "30"}));
+  Process watcher(watch({"--grid-csv", csv, "--timeout-s", "30"}));
   ASSERT_TRUE(watcher.wait_for("vmc-3  publisher is alive")) << watcher.transcript();
   Process fake(stranger("fake"));
   ASSERT_TRUE(watcher.wait_for("vmc-3  another publisher ")) << watcher.transcript();
@@ -366,8 +366,8 @@ TEST_F(Strangers, AFakeGridBesideTheTrueOneIsIgnored) {
 TEST_F(Strangers, WatchReportsThatSecurityIsOff) {
   const std::string log = directory_ / "log";
   Process watcher({"/bin/sh", "-c", "exec \"$@\" 2>&1", "sh", ABBE_WATCH_PROGRAM, "--domain",
-                   domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE, "--until-model", "--timeout",
-                   "0.1"});
+                   domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE, "--until-model",
+                   "--timeout-s", "0.1"});
   EXPECT_EQ(watcher.wait_for_end(), 1);
   EXPECT_NE(watcher.transcript().find("DDS Security is off: anyone on domain " + domain_.text()),
             std::string::npos);

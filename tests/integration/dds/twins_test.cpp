@@ -90,7 +90,7 @@ TEST_F(Twins, OfTwoWithOneIdentityALateSubscriberUsesNone) {
   EXPECT_TRUE(linuxcnc.wait_for("not usable: nothing received about machine \"vmc-3\": several"))
       << linuxcnc.transcript();
   Process watcher(watch(
-      {"--machine", kMachine, "--machine-id", kMachineId, "--until-model", "--timeout", "3"}));
+      {"--machine", kMachine, "--machine-id", kMachineId, "--until-model", "--timeout-s", "3"}));
   EXPECT_EQ(watcher.wait_for_end(), 1) << watcher.transcript();
 }
 
@@ -134,10 +134,10 @@ TEST_F(Twins, ALateSubscriberUsesTheOneThatItWasGivenAndElseNone) {
         << each->transcript();
     EXPECT_FALSE(each->wait_for("vmc-3: publisher is", {}, 0s)) << each->transcript();
   }
-  Process watcher(
-      watch({"--machine", kMachine, "--machine-id", kTwinId, "--until-model", "--timeout", "20"}));
+  Process watcher(watch(
+      {"--machine", kMachine, "--machine-id", kTwinId, "--until-model", "--timeout-s", "20"}));
   EXPECT_EQ(watcher.wait_for_end(), 0) << watcher.transcript();
-  Process undecided(watch({"--machine", kMachine, "--until-model", "--timeout", "3"}));
+  Process undecided(watch({"--machine", kMachine, "--until-model", "--timeout-s", "3"}));
   EXPECT_EQ(undecided.wait_for_end(), 1) << undecided.transcript();
 }
 

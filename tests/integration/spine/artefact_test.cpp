@@ -75,7 +75,7 @@ struct ArtefactRun : CounterCardRun {
   [[nodiscard]] std::vector<std::string> command(std::vector<std::string> more = {}) const {
     std::vector<std::string> all{
         ABBE_PROGRAM, "calibrate",        "artefact", "--calibrator",          file("nominal.toml"),
-        "-c",         file("abbed.toml"), "-o",       file("calibrator.toml"), "--at",
+        "-c",         file("abbed.toml"), "-o",       file("calibrator.toml"), "--at-mm",
         "100,100,0"};
     all.insert(all.end(), more.begin(), more.end());
     return all;

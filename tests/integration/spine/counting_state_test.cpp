@@ -60,7 +60,7 @@ struct CountingRun : CounterCardRun {
   static constexpr double kStands_m = 1e-5;  // the counts of a simulated scale scatter less
 };
 
-TEST_F(CountingRun, TheDatumIsKeptAfterAKillAndAfterAStop) {
+TEST_F(CountingRun, TheZeroIsKeptAfterAKillAndAfterAStop) {
   const double before_m = x_m();
   ASSERT_NO_FATAL_FAILURE(kill_abbed());
   ASSERT_NO_FATAL_FAILURE(start_abbed());

@@ -54,7 +54,7 @@ TEST_F(LostDaemon, IsReportedToItsSubscribersWhetherItHangsOrEnds) {
   ASSERT_NO_FATAL_FAILURE(activate_a_model());
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   watch_ = start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile",
-                  ABBE_LOOPBACK_PROFILE, "--json", "--timeout", "100"},
+                  ABBE_LOOPBACK_PROFILE, "--json", "--timeout-s", "100"},
                  "watch");
   ASSERT_TRUE(hears("ACTIVE")) << last_state().dump();
 

@@ -61,16 +61,16 @@ TEST_F(ReferenceRun, FindsThePositionsAtWhichTheCountersStarted) {
   }
   EXPECT_TRUE(status()["reference"]["axes"][2]["known"].get<bool>());
 
-  // Both cards' bytes are recorded: the marks in them give the same datum once more.
+  // Both cards' bytes are recorded: the marks in them give the same zero once more.
   ASSERT_EQ(abbed_->stop(), 0) << abbed_->err();
   const auto again =
       run({ABBE_PROGRAM, "replay", "--raw", "--json", recordings().front().string()});
-  const json datums = json::parse(again.out)["reference"];
-  ASSERT_EQ(datums.size(), 3u) << again.out << again.err;
-  for (const auto& datum : datums) {
-    ASSERT_TRUE(datum["again"].is_number()) << datum.dump();
-    EXPECT_EQ(datum["again"].get<double>(), datum["live"].get<double>())
-        << datum.dump();  // to the last bit
+  const json zeros = json::parse(again.out)["reference"];
+  ASSERT_EQ(zeros.size(), 3u) << again.out << again.err;
+  for (const auto& zero : zeros) {
+    ASSERT_TRUE(zero["again"].is_number()) << zero.dump();
+    EXPECT_EQ(zero["again"].get<double>(), zero["live"].get<double>())
+        << zero.dump();  // to the last bit
   }
 }
 

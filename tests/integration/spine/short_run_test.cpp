@@ -30,7 +30,7 @@ struct ShortRun : Spine {
     start_abbed();
     watch_ =
         start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
-               "--json", "--compare", file("truth.csv"), "--timeout", "100"},
+               "--json", "--compare", file("truth.csv"), "--timeout-s", "100"},
               "watch");
 #else
     write_configuration("off");

@@ -24,7 +24,7 @@ struct WholeArray : TouchingRun {
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     watch_ =
         start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
-               "--json", "--compare", file("truth.csv"), "--timeout", "100"},
+               "--json", "--compare", file("truth.csv"), "--timeout-s", "100"},
               "watch");
 #else
     write_touching_configuration();

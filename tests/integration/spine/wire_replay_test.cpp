@@ -105,7 +105,7 @@ class WireRun {
     artefact_ = std::make_unique<Program>(
         std::vector<std::string>{ABBE_PROGRAM, "calibrate", "artefact", "--calibrator",
                                  (kGolden / "artefact.toml").string(), "-c", file("abbed.toml"),
-                                 "-o", file("calibrator.toml"), "--at", "0,0,0", "--points", "5",
+                                 "-o", file("calibrator.toml"), "--at-mm", "0,0,0", "--points", "5",
                                  "--block-points", "4"},
         folder_ / "artefact");
   }

@@ -72,8 +72,8 @@ void print_model(const char* name, const VolumetricModel& model) {
   hash.print(name);
 }
 
-/// Case A of the reference data: 4663 blocks of 40 m, 149 unknowns.
-void print_on_the_fly_from_blocks() {
+/// Case A of the reference data: 4663 segments of 40 m, 149 unknowns.
+void print_on_the_fly_from_segments() {
   using namespace abbe::tests::otf;
   const RigidTransform T = case_a_alignment(true);
   const otf::Path path = case_a_path();
@@ -84,11 +84,11 @@ void print_on_the_fly_from_blocks() {
   };
 
   const auto series =
-      otf::blocks_from_means(case_a_blocks().means_tracker_m, seen_at(path.vertices_m.front()),
-                             seen_at(path.vertices_m.back()), {});
-  const auto observations = otf::observe_blocks(must(series, "blocks"), machine, path, {});
+      otf::segments_from_means(case_a_segments().means_tracker_m, seen_at(path.vertices_m.front()),
+                               seen_at(path.vertices_m.back()), {});
+  const auto observations = otf::observe_segments(must(series, "segments"), machine, path, {});
   const auto solution = otf::solve(must(observations, "observe"));
-  print_model("on-the-fly, blocks", must(solution, "solve").model);
+  print_model("on-the-fly, segments", must(solution, "solve").model);
 }
 
 /// A tracker 2.5 m away with noise of 6 um, and with `slow_m` also a noise correlated over 50
@@ -114,7 +114,7 @@ void print_on_the_fly_from_samples(const char* name, double slow_m) {
     slow = 0.98 * slow + 0.2 * Vector3(noise.data());
   }
 
-  const otf::Options options{.block_samples = 10, .orientation = {.scales_agree = true}};
+  const otf::Options options{.segment_samples = 10, .orientation = {.scales_agree = true}};
   const auto run = otf::identify(samples, machine, path, {}, options);
   print_model(name, must(run, "identify").solution.model);
   if (slow_m > 0.0) {
@@ -155,7 +155,7 @@ void print_ball_array(const char* name, evemu::Estimator estimator) {
 int main() {
   print_elementary();
   print_spherical();
-  print_on_the_fly_from_blocks();
+  print_on_the_fly_from_segments();
   print_on_the_fly_from_samples("on-the-fly, samples", 0.0);
   print_on_the_fly_from_samples("on-the-fly, correlated noise", 3e-6);
   print_ball_array("ball array, bayes-pose", evemu::Estimator::BayesPose);

@@ -336,13 +336,13 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
         add_slow_noise(verdict, solution);
         note_artefact(o, verdict);
         note_what_touches_do_not_show(verdict, o, extent_m(o));
-        if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
+        if (const auto& fit = solution.rotation.rotation_reference; fit && !fit->outside.empty()) {
           verdict.notes.push_back(
               message("rotation reference: ", fit->outside.size(), " of ",
                       fit->outside.size() + fit->points,
                       " points lie outside the volume the balls span and were not used"));
         }
-        if (const auto& fit = solution.rotation.reference; fit && fit->widened > 1.0) {
+        if (const auto& fit = solution.rotation.rotation_reference; fit && fit->widened > 1.0) {
           verdict.notes.push_back(
               message("rotation reference: chi-square ", fit->widened,
                       " per degree of freedom; the rotation's uncertainty is enlarged for it"));

@@ -194,7 +194,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
 
   ABBE_TRY(turned);
 
-  return VolumetricModel::from_polynomials(*std::move(turned), Gauge::Ball1,
+  return VolumetricModel::from_polynomials(*std::move(turned), ModelDatum::Ball1,
                                            solution.model.tool_offsets_m().front(),
                                            solution.model.validity())
       .and_then([&](VolumetricModel model) {
@@ -206,7 +206,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
         solution.rotation.removed_rad -= turn.omega_rad;
         solution.rotation.cov_rad2 = widened * cov_rad2;
         solution.rotation.referenced = true;
-        solution.rotation.reference =
+        solution.rotation.rotation_reference =
             ReferenceFit{used.points.size(), used.outside, turn.chi2, turn.dof, widened};
         return solution;
       });

@@ -277,9 +277,9 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
       PolynomialModel::of(*design, o.ball1_m, fit->c_m, fit->covariance_m2);
   ABBE_TRY(evemu);
 
-  return VolumetricModel::from_polynomials(*std::move(evemu),
-                                           rotation->referenced ? Gauge::Ball1 : Gauge::Ball1Blocks,
-                                           o.machine.tool_offset_m, *std::move(validity))
+  return VolumetricModel::from_polynomials(
+             *std::move(evemu), rotation->referenced ? ModelDatum::Ball1 : ModelDatum::Ball1Blocks,
+             o.machine.tool_offset_m, *std::move(validity))
       .and_then([&](VolumetricModel model) {
         const std::optional<Misfit> misfit = find_misfit(o, model, statistics);
         return misfit ? model.with_misfit(*misfit) : Result<VolumetricModel>(std::move(model));

@@ -142,7 +142,7 @@ Result<Eigen::VectorXd> Trials::next() {
 }
 
 void set_ratios(MonteCarlo& result, const Eigen::MatrixXd& covariance) {
-  // A parameter that the gauge fixes has no uncertainty, only rounding.
+  // A parameter that the datum fixes has no uncertainty, only rounding.
   constexpr double kNone = 1e-15;
   std::size_t count = 0;
   result.smallest_ratio = std::numeric_limits<double>::infinity();

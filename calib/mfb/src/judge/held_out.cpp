@@ -9,7 +9,7 @@
 #include <map>
 #include <tuple>
 
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "abbe/result/try.hpp"
 #include "observe/without_pass.hpp"
 
@@ -24,7 +24,7 @@ enum class Unknowns { All, WithoutTables };
 
 class StackedRows {
  public:
-  StackedRows(const JointSystem& system, Unknowns which)
+  StackedRows(const WholeSystem& system, Unknowns which)
       : first_shared_(which == Unknowns::All ? 0 : system.shared.bar_offset()) {
     Eigen::Index rows = 0, columns = system.shared.size() - first_shared_;
     for (const PositionSystem& p : system.positions) {
@@ -55,7 +55,7 @@ class StackedRows {
   }
 
  private:
-  void set_rows(Eigen::MatrixXd& M, const JointSystem& system) const {
+  void set_rows(Eigen::MatrixXd& M, const WholeSystem& system) const {
     Eigen::Index row = 0, column = system.shared.size() - first_shared_;
     const Eigen::Index shared = column;
     for (const PositionSystem& p : system.positions) {
@@ -67,7 +67,7 @@ class StackedRows {
   }
 
   /// The bar and alpha are in units of their uncertainty; tables have no prior.
-  void set_priors(Eigen::Ref<Eigen::MatrixXd> M, const JointSystem& system) const {
+  void set_priors(Eigen::Ref<Eigen::MatrixXd> M, const WholeSystem& system) const {
     Eigen::Index column = system.shared.size() - first_shared_;
     for (Eigen::Index i = system.shared.bar_offset() - first_shared_; i < column; ++i) {
       M(i, i) = 1.0;
@@ -88,7 +88,7 @@ class StackedRows {
 /// out:
 /// delta + D s, s_k = n_k . R^T V(q_k, t).
 using ErrorsOfModel = std::function<Vector3(const Vector3& reading_m, const Vector3& tool_m)>;
-Eigen::VectorXd whitened_deviations(const Observations& o, const JointSystem& system,
+Eigen::VectorXd whitened_deviations(const Observations& o, const WholeSystem& system,
                                     const ErrorsOfModel& V) {
   std::vector<double> all;
   for (const PositionSystem& p : system.positions) {
@@ -108,7 +108,7 @@ Eigen::VectorXd whitened_deviations(const Observations& o, const JointSystem& sy
   return Eigen::Map<const Eigen::VectorXd>(all.data(), std::ssize(all));
 }
 
-Eigen::VectorXd whitened_deviations(const JointSystem& system) {
+Eigen::VectorXd whitened_deviations(const WholeSystem& system) {
   std::vector<double> all;
   for (const PositionSystem& p : system.positions) {
     all.insert(all.end(), p.y.data(), p.y.data() + p.y.size());
@@ -127,7 +127,7 @@ struct PointOfPass {
 /// them, so they are left out together.
 using PointGroup = std::vector<PointOfPass>;
 
-std::vector<PointGroup> point_groups(const Observations& o, const JointSystem& system) {
+std::vector<PointGroup> point_groups(const Observations& o, const WholeSystem& system) {
   std::map<std::tuple<std::size_t, std::size_t, std::size_t>, PointGroup> groups;
   Eigen::Index first = 0;
   for (const PositionSystem& p : system.positions) {
@@ -184,7 +184,7 @@ struct LeftOutPoint {
 using LeftOutPoints = std::map<std::pair<std::size_t, std::size_t>, LeftOutPoint>;
 
 /// `predicted`: the rows that decide whether a point is predicted.
-LeftOutPoints left_out(const Observations& o, const JointSystem& system, const StackedRows& rows,
+LeftOutPoints left_out(const Observations& o, const WholeSystem& system, const StackedRows& rows,
                        const StackedRows& predicted, const Eigen::VectorXd& y) {
   LeftOutPoints points;
   const Eigen::VectorXd residuals = rows.residuals(y);
@@ -230,7 +230,7 @@ FigureOfPoints figure_of(const LeftOutPoints& points) {
   return sum;
 }
 
-Eigen::VectorXd deviations_with_tables(const Observations& o, const JointSystem& system,
+Eigen::VectorXd deviations_with_tables(const Observations& o, const WholeSystem& system,
                                        const Eigen::VectorXd& U) {
   return whitened_deviations(o, system, [&](const Vector3& q, const Vector3& t) {
     return o.basis.V_m({.q_m = q, .tool_offset_m = t},
@@ -279,7 +279,7 @@ Result<void> compare_with_active(HeldOutFigures& figures, const Observations& al
   if (o.passes.empty()) {
     return {};
   }
-  const Result<JointSystem> system = joint_system(o, nuisance_options(options));
+  const Result<WholeSystem> system = whole_system(o, nuisance_options(options));
   ABBE_TRY(system);
   const StackedRows own(*system, Unknowns::WithoutTables);
   const LeftOutPoints of_active = left_out(
@@ -314,14 +314,14 @@ Result<void> compare_with_active(HeldOutFigures& figures, const Observations& al
 
 Result<HeldOutFigures> held_out(const Observations& o, const Solution& solution,
                                 const VolumetricModel* active, const SolveOptions& options) {
-  const Result<JointSystem> system = joint_system(o, nuisance_options(options));
+  const Result<WholeSystem> system = whole_system(o, nuisance_options(options));
   ABBE_TRY(system);
   const StackedRows own(*system, Unknowns::WithoutTables);
   const StackedRows all(*system, Unknowns::All);
   const Eigen::VectorXd y = whitened_deviations(*system);
   const LeftOutPoints none = left_out(o, *system, own, all, y);
   const LeftOutPoints candidate =
-      options.estimator == Estimator::Joint
+      options.estimator == Estimator::Simultaneous
           ? left_out(o, *system, all, all, y)
           : left_out(o, *system, own, all, deviations_with_tables(o, *system, solution.U));
 

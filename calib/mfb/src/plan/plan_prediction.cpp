@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "abbe/calib/internal/base/message.hpp"
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "abbe/result/try.hpp"
 #include "observe/observations.hpp"
 

@@ -25,7 +25,7 @@ Eigen::VectorXd variance_of(const SharedUnknowns& shared, const SharedEstimate& 
   return shared.expanded(half.transpose()).diagonal();
 }
 
-VarianceParts variance_parts(const JointSystem& system, const SharedEstimate& estimate) {
+VarianceParts variance_parts(const WholeSystem& system, const SharedEstimate& estimate) {
   const SharedUnknowns& shared = system.shared;
   VarianceParts parts;
   parts.total = variance_of(shared, estimate);
@@ -48,7 +48,7 @@ VarianceParts variance_parts(const JointSystem& system, const SharedEstimate& es
 }
 
 /// The variance that the estimation of the drift adds; zero without pairs.
-void set_drift(VarianceParts& parts, const Observations& o, const JointSystem& system,
+void set_drift(VarianceParts& parts, const Observations& o, const WholeSystem& system,
                NuisanceOptions options) {
   const bool pairs = std::any_of(o.passes.begin(), o.passes.end(),
                                  [](const PassObservation& p) { return p.pair.has_value(); });
@@ -56,7 +56,7 @@ void set_drift(VarianceParts& parts, const Observations& o, const JointSystem& s
     return;
   }
   options.drift = false;
-  if (const Result<JointSystem> without = joint_system(o, options)) {
+  if (const Result<WholeSystem> without = whole_system(o, options)) {
     parts.drift = (parts.total - variance_of(system.shared, estimate_of(*without))).cwiseMax(0.0);
   }
 }
@@ -83,7 +83,7 @@ Budget largest_of(std::string name, const VarianceParts& parts, Eigen::Index fir
 
 }  // namespace
 
-std::vector<Budget> budget_of(const Observations& o, const JointSystem& system,
+std::vector<Budget> budget_of(const Observations& o, const WholeSystem& system,
                               const SharedEstimate& estimate, const NuisanceOptions& options) {
   VarianceParts parts = variance_parts(system, estimate);
   set_drift(parts, o, system, options);

@@ -5,11 +5,11 @@
 /// All touches have the same noise along their normals, so its parts of probe and machine have the
 /// ratio of their variances.
 
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 
 namespace abbe::calib::mfb {
 
-[[nodiscard]] std::vector<Budget> budget_of(const Observations&, const JointSystem&,
+[[nodiscard]] std::vector<Budget> budget_of(const Observations&, const WholeSystem&,
                                             const SharedEstimate&, const NuisanceOptions&);
 
 }  // namespace abbe::calib::mfb

@@ -112,7 +112,7 @@ std::vector<Vector3> tools_of(const Plan& plan) {
 
 Result<VolumetricModel> model_of(const Observations& o, const Solution& solution) {
   return touched_box(o).and_then([&](ValidityVolume volume) {
-    return VolumetricModel::from_vector(o.basis, Gauge::G2, tools_of(o.plan), solution.U,
+    return VolumetricModel::from_vector(o.basis, ModelDatum::G2, tools_of(o.plan), solution.U,
                                         solution.covariance, std::move(volume));
   });
 }
@@ -122,12 +122,13 @@ LikelyCause cause_of_sequence(const Statistics& s) {
   if (!(s.chi2_per_dof > s.chi2_per_dof_limit)) {
     return {};
   }
-  return {Cause::Unknown,
-          message("chi-square per degree of freedom is ", s.chi2_per_dof, ", at most ",
-                  s.chi2_per_dof_limit,
-                  ": the sequence loses the slope of EAX and the places of the rods; the joint "
-                  "estimator tells faults of the measurement from that"),
-          s.chi2_per_dof};
+  return {
+      Cause::Unknown,
+      message("chi-square per degree of freedom is ", s.chi2_per_dof, ", at most ",
+              s.chi2_per_dof_limit,
+              ": the sequence loses the slope of EAX and the places of the rods; the simultaneous "
+              "estimator tells faults of the measurement from that"),
+      s.chi2_per_dof};
 }
 
 std::vector<TouchResidual> residuals_of_touches(const std::vector<ResidualsOfFeature>& features,
@@ -179,7 +180,7 @@ Result<Identification> identify(const Bar& bar, const Plan& plan,
 
   Result<VolumetricModel> model = model_of(at->observations, at->solution);
   ABBE_TRY(model);
-  LikelyCause cause = options.solve.estimator == Estimator::Joint
+  LikelyCause cause = options.solve.estimator == Estimator::Simultaneous
                           ? likely_cause(at->observations, at->solution, options.solve)
                           : cause_of_sequence(at->solution.statistics);
   std::vector<std::string> notes = at->observations.notes;

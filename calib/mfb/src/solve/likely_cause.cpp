@@ -6,7 +6,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "observe/without_pass.hpp"
 
 namespace abbe::calib::mfb {
@@ -52,7 +52,7 @@ void try_drift(LikelyCause& best, const Observations& o, const SolveOptions& opt
   with_drift.u_rate_of_every_pass_m = kDriftSearched_m;
   const bool all_pairs = std::all_of(o.passes.begin(), o.passes.end(),
                                      [](const PassObservation& p) { return p.pair.has_value(); });
-  keep_better(best, Cause::Drift, joint_statistics(o, with_drift),
+  keep_better(best, Cause::Drift, whole_statistics(o, with_drift),
               all_pairs ? "the drift is not linear within a pair of passes: wait until bar and "
                           "machine have the same temperature"
                         : "the bar or the machine drifts during the passes: measure each pass "
@@ -80,7 +80,7 @@ void try_holes(LikelyCause& best, const Observations& o, const Solution& solutio
     Observations free = o;
     free.bar.covariance_m2.diagonal().segment<3>(3 * static_cast<Eigen::Index>(hole)).array() +=
         kHoleSearched_m * kHoleSearched_m;
-    keep_better(best, Cause::Hole, joint_statistics(free, nuisance_options(options)),
+    keep_better(best, Cause::Hole, whole_statistics(free, nuisance_options(options)),
                 message(hole_name(hole),
                         " is not where its calibration states: look for dirt or damage in the hole "
                         "and at the rods beside it, and calibrate the bar"));
@@ -97,7 +97,7 @@ void try_measurements(LikelyCause& best, const Observations& o, const Solution& 
   for (const std::size_t pass : largest(chi2, kMostTried)) {
     const PassResiduals& residuals = solution.residuals[pass];
     keep_better(best, Cause::Measurement,
-                joint_statistics(without_clamping(o, pass), nuisance_options(options)),
+                whole_statistics(without_clamping(o, pass), nuisance_options(options)),
                 message("measurement ", residuals.measurement,
                         " is left out: the bar moved in its clamping, the stylus changed, or "
                         "touches of one feature are wrong (the largest residual is at ",

@@ -1,6 +1,6 @@
 #include "solve/linear_estimator.hpp"
 
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "solve/sequential.hpp"
 
 namespace abbe::calib::mfb {
@@ -11,7 +11,7 @@ Result<LinearEstimator> linear_estimator(const Observations& o, const SolveOptio
         [](std::vector<Eigen::MatrixXd> of_pass) { return LinearEstimator{std::move(of_pass)}; });
   }
 
-  return joint_system(o, nuisance_options(options)).map([&](const JointSystem& system) {
+  return whole_system(o, nuisance_options(options)).map([&](const WholeSystem& system) {
     const Eigen::MatrixXd C = estimate_of(system).covariance.topRows(system.shared.parameters());
     LinearEstimator estimator;
     estimator.of_pass.resize(o.passes.size());

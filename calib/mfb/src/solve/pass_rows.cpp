@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "abbe/calib/estimation/block.hpp"
+#include "abbe/calib/estimation/observation_group.hpp"
 #include "abbe/calib/internal/geometry/cell_form.hpp"
 
 namespace abbe::calib::mfb {

@@ -96,7 +96,7 @@ Eigen::VectorXd covariance_with_nuisance(const PositionSystem& s, const SharedEs
   return -(estimate.covariance * nuisance_row(s, k).shared);
 }
 
-void set_degrees_of_freedom(Solution& solution, const JointSystem& system,
+void set_degrees_of_freedom(Solution& solution, const WholeSystem& system,
                             const SharedEstimate& estimate) {
   for (const PositionSystem& s : system.positions) {
     const Eigen::MatrixXd Q =
@@ -112,7 +112,7 @@ void set_degrees_of_freedom(Solution& solution, const JointSystem& system,
   }
 }
 
-void set_residuals(Solution& solution, const Observations& o, const JointSystem& system,
+void set_residuals(Solution& solution, const Observations& o, const WholeSystem& system,
                    const SharedEstimate& estimate) {
   solution.residuals.resize(o.passes.size());
   for (const PositionSystem& s : system.positions) {

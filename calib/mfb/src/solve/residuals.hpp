@@ -1,7 +1,7 @@
 #pragma once
-/// Residuals, poses and drift of a joint adjustment.
+/// Residuals, poses and drift of a simultaneous adjustment.
 
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 
 namespace abbe::calib::mfb {
 
@@ -19,10 +19,10 @@ struct NuisanceRow {
 [[nodiscard]] Eigen::VectorXd covariance_with_nuisance(const PositionSystem&, const SharedEstimate&,
                                                        Eigen::Index k);
 
-void set_residuals(Solution&, const Observations&, const JointSystem&, const SharedEstimate&);
+void set_residuals(Solution&, const Observations&, const WholeSystem&, const SharedEstimate&);
 /// Degrees of freedom of each pass: its rows less their diagonal elements of the hat matrix. Row i
 /// of the whitened [A L] has the element |row i of L R^-1|^2 + |row i of (A - L R^-1 G) X|^2, X
 /// X^T: covariance of the shared unknowns.
-void set_degrees_of_freedom(Solution&, const JointSystem&, const SharedEstimate&);
+void set_degrees_of_freedom(Solution&, const WholeSystem&, const SharedEstimate&);
 
 }  // namespace abbe::calib::mfb

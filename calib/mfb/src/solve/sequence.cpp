@@ -134,7 +134,7 @@ Result<HoleRows> Sequence::at_nodes(Axis a, const HoleRows& values, std::size_t 
       });
 }
 
-void Sequence::impose_gauge(ErrorMotion motion, Eigen::Ref<Eigen::MatrixXd> rows) const {
+void Sequence::impose_datum(ErrorMotion motion, Eigen::Ref<Eigen::MatrixXd> rows) const {
   const AxisNodes& axis = o_.basis.layout().nodes()[index(motion.axis)];
   const Eigen::Index last = rows.rows() - 1;
   if (is_straightness(motion)) {
@@ -159,7 +159,7 @@ Result<void> Sequence::set(ErrorMotion motion, const HoleRows& values, std::size
   ABBE_TRY(found);
   const auto first = static_cast<Eigen::Index>(o_.basis.layout().find(motion)->offset);
   U_.middleRows(first, found->rows()) = *found;
-  impose_gauge(motion, U_.middleRows(first, found->rows()));
+  impose_datum(motion, U_.middleRows(first, found->rows()));
   std::fill_n(known_.begin() + first, found->rows(), true);
   return {};
 }

@@ -54,12 +54,12 @@ class Sequence {
     return sum;
   }
 
-  /// Sets a table from its values at the holes of profile m, in gauge G2.
+  /// Sets a table from its values at the holes of profile m, in datum G2.
   Result<void> set(ErrorMotion, const HoleRows& values, std::size_t m);
   /// Values at the nodes of an axis from those at the holes.
   [[nodiscard]] Result<HoleRows> at_nodes(Axis, const HoleRows& values, std::size_t m) const;
-  /// Subtracts what gauge G2 requires from the rows of a table.
-  void impose_gauge(ErrorMotion, Eigen::Ref<Eigen::MatrixXd> rows) const;
+  /// Subtracts what datum G2 requires from the rows of a table.
+  void impose_datum(ErrorMotion, Eigen::Ref<Eigen::MatrixXd> rows) const;
   Result<void> x_stage();
   Result<void> y_stage();
   Result<void> z_stage();

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "abbe/calib/internal/base/message.hpp"
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "abbe/calib/internal/statistics/quantile_999.hpp"
 #include "abbe/result/try.hpp"
 #include "solve/residuals.hpp"
@@ -64,7 +64,7 @@ Result<Eigen::MatrixXd> root_of_result(const Observations& o, const Sequence& se
 /// Residuals and poses for the tables found: every position gets its best pose.
 Result<void> set_residuals_of_sequence(Solution& solution, const Observations& o,
                                        const SolveOptions& options) {
-  const Result<JointSystem> system = joint_system(o, nuisance_options(options));
+  const Result<WholeSystem> system = whole_system(o, nuisance_options(options));
   ABBE_TRY(system);
   SharedEstimate estimate;
   estimate.x = Eigen::VectorXd::Zero(system->shared.size());

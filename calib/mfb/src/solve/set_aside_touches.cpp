@@ -6,7 +6,7 @@
 #include <map>
 
 #include "abbe/calib/internal/base/message.hpp"
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "abbe/calib/internal/statistics/median.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
 #include "observe/observations.hpp"
@@ -215,7 +215,7 @@ std::size_t worst_suspect(const Observations& o, const std::vector<PassTouches>&
     if (!observe_pass(changed, *pass, without, nominal, options.limits, false)) {
       continue;
     }
-    const Result<double> chi2 = joint_chi2(changed, nuisance_options(options.solve));
+    const Result<double> chi2 = whole_chi2(changed, nuisance_options(options.solve));
     if (chi2 && *chi2 < least) {
       least = *chi2;
       best = i;

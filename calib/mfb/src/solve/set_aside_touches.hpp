@@ -37,7 +37,8 @@ struct Suspects {
                                                const SetAsideOptions&,
                                                std::vector<std::string>& left);
 
-/// The suspect without which the joint chi-square is smallest; `touches` are those of the plan.
+/// The suspect without which the chi-square of all passes is smallest; `touches` are those of the
+/// plan.
 [[nodiscard]] std::size_t worst_suspect(const Observations&,
                                         const std::vector<PassTouches>& touches, const Suspects&,
                                         const Options&);

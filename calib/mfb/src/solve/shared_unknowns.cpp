@@ -3,7 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -29,7 +29,7 @@ SharedUnknowns::SharedUnknowns(const Observations& o)
       growth_of_temperature_(o.bar.expansion ? std::abs(o.bar.expansion->alpha_per_K) *
                                                    o.plan.noise.common_temperature_K()
                                              : 0.0) {
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G2, o.basis, o.basis.size());
+  const Eigen::MatrixXd K = datum_conditions(ModelDatum::G2, o.basis, o.basis.size());
   std::vector<Eigen::Index> condition_of(o.basis.size(), -1);
   for (Eigen::Index row = 0; row < K.rows(); ++row) {
     Eigen::Index pivot = 0;

@@ -5,7 +5,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 #include "abbe/result/try.hpp"
 #include "observe/bar_temperature.hpp"
 #include "solve/sequential.hpp"
@@ -41,11 +41,11 @@ std::vector<std::string> errors_not_shown(const Observations& o, const Eigen::Ve
 }  // namespace
 
 std::string_view name(Estimator estimator) {
-  return estimator == Estimator::Joint ? "joint" : "sequential";
+  return estimator == Estimator::Simultaneous ? "simultaneous" : "sequential";
 }
 
 std::optional<Estimator> estimator_named(std::string_view text) {
-  for (const Estimator estimator : {Estimator::Joint, Estimator::Sequential}) {
+  for (const Estimator estimator : {Estimator::Simultaneous, Estimator::Sequential}) {
     if (text == name(estimator)) {
       return estimator;
     }
@@ -77,8 +77,8 @@ Result<void> check_shown(const Observations& o, const Solution& solution,
 }
 
 Result<Solution> solve(const Observations& o, const SolveOptions& options) {
-  Result<Solution> solution = options.estimator == Estimator::Joint
-                                  ? solve_joint(o, nuisance_options(options))
+  Result<Solution> solution = options.estimator == Estimator::Simultaneous
+                                  ? solve_simultaneously(o, nuisance_options(options))
                                   : solve_sequential(o, options);
   if (!solution) {
     return solution;

@@ -3,9 +3,9 @@
 
 #include <utility>
 
-#include "abbe/calib/internal/otf/observe/aligned_blocks.hpp"
-#include "abbe/calib/internal/otf/solve/joint.hpp"
+#include "abbe/calib/internal/otf/observe/aligned_segments.hpp"
 #include "abbe/calib/internal/otf/solve/prewhitening.hpp"
+#include "abbe/calib/internal/otf/solve/simultaneous.hpp"
 #include "abbe/result/try.hpp"
 #include "identify/synchronised.hpp"
 #include "observe/observe_aligned.hpp"
@@ -51,9 +51,9 @@ Result<Solution> solve_smooth(Observations& o, const RowInformation& rows, const
   return solution;
 }
 
-Result<Identification> joint(Observations of_alignment, const BlockSeries& series,
-                             const Noise& noise, const Options& options, AlongRows* along) {
-  Result<JointObservations> at_solution =
+Result<Identification> simultaneous(Observations of_alignment, const SegmentSeries& series,
+                                    const Noise& noise, const Options& options, AlongRows* along) {
+  Result<ObservationsAtSolution> at_solution =
       linearise_at_solution(std::move(of_alignment), series, noise, options, along);
   ABBE_TRY(at_solution);
 
@@ -67,7 +67,7 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
               [&](Solution s) { return with_misfit(std::move(s), at_solution->observations); });
   ABBE_TRY(solution);
 
-  solution->estimator = Estimator::Joint;
+  solution->estimator = Estimator::Simultaneous;
   solution->statistics.iterations = at_solution->adjustments;
   return Identification{std::move(at_solution->observations), *std::move(solution)};
 }
@@ -100,16 +100,16 @@ auto naming_unused(const Observations& o) {
   };
 }
 
-Result<Identification> estimated(Observations across, const BlockSeries& series, const Noise& noise,
-                                 const Options& options, AlongRows* along) {
-  if (options.estimator == Estimator::Joint) {
-    return joint(std::move(across), series, noise, options, along);
+Result<Identification> estimated(Observations across, const SegmentSeries& series,
+                                 const Noise& noise, const Options& options, AlongRows* along) {
+  if (options.estimator == Estimator::Simultaneous) {
+    return simultaneous(std::move(across), series, noise, options, along);
   }
   return two_step(along != nullptr ? along->added_to(across, series, noise) : std::move(across),
                   options);
 }
 
-Result<Identification> identify_observed(Observations observations, const BlockSeries& series,
+Result<Identification> identify_observed(Observations observations, const SegmentSeries& series,
                                          const Noise& noise, const Options& options) {
   observations = with_smoothness(std::move(observations), options);
   const auto name_unused = naming_unused(observations);
@@ -135,17 +135,17 @@ Result<Identification> identify(std::span<const TrackerObservation> samples, con
     });
   }
 
-  Result<AlignedBlocks> run = aligned_blocks(samples, machine, path, noise, options);
+  Result<AlignedSegments> run = aligned_segments(samples, machine, path, noise, options);
   ABBE_TRY(run);
   return observe_with_nests(*run, machine, path, noise, options).and_then([&](Observations o) {
     return identify_observed(std::move(o), run->series, noise, options);
   });
 }
 
-Result<Identification> identify_blocks(const BlockSeries& series, const Machine& machine,
-                                       const Path& path, const Noise& noise,
-                                       const Options& options) {
-  return observe_blocks(series, machine, path, noise, options).and_then([&](Observations o) {
+Result<Identification> identify_segments(const SegmentSeries& series, const Machine& machine,
+                                         const Path& path, const Noise& noise,
+                                         const Options& options) {
+  return observe_segments(series, machine, path, noise, options).and_then([&](Observations o) {
     return identify_observed(std::move(o), series, noise, options);
   });
 }

@@ -41,12 +41,13 @@ Result<Observations> observe(std::span<const TrackerObservation> samples, const 
   if (options.mode == Mode::Standstill) {
     return observe_standing(samples, machine, path, noise, options);
   }
-  return aligned_blocks(samples, machine, path, noise, options).and_then([&](AlignedBlocks run) {
-    return observe_with_nests(run, machine, path, noise, options);
-  });
+  return aligned_segments(samples, machine, path, noise, options)
+      .and_then([&](AlignedSegments run) {
+        return observe_with_nests(run, machine, path, noise, options);
+      });
 }
 
-Result<Observations> observe_with_nests(const AlignedBlocks& run, const Machine& machine,
+Result<Observations> observe_with_nests(const AlignedSegments& run, const Machine& machine,
                                         const Path& path, const Noise& noise,
                                         const Options& options) {
   return observe_aligned(run.series, run.alignment, machine, path, noise, options)

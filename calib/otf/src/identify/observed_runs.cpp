@@ -6,7 +6,7 @@
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/model/tool_span.hpp"
-#include "abbe/calib/internal/otf/solve/joint.hpp"
+#include "abbe/calib/internal/otf/solve/simultaneous.hpp"
 #include "abbe/result/try.hpp"
 #include "observe/observe_aligned.hpp"
 #include "solve/change_in_u.hpp"
@@ -28,15 +28,15 @@ Result<TableBasis> basis_of_all_tables(const Machine& machine, TravelDependence 
 }
 
 Result<Observations> observe_run(const TargetRun& run, Machine machine, const Noise& noise,
-                                 const Options& options, std::vector<BlockSeries>& series) {
+                                 const Options& options, std::vector<SegmentSeries>& series) {
   machine.target_offset_m = run.target_offset_m;
   if (options.mode == Mode::Standstill) {
     return observe(run.samples, machine, run.path, noise, options);
   }
-  return aligned_blocks(run.samples, machine, run.path, noise, options)
-      .and_then([&](AlignedBlocks blocks) {
-        series.push_back(blocks.series);
-        return observe_with_nests(blocks, machine, run.path, noise, options);
+  return aligned_segments(run.samples, machine, run.path, noise, options)
+      .and_then([&](AlignedSegments segments) {
+        series.push_back(segments.series);
+        return observe_with_nests(segments, machine, run.path, noise, options);
       });
 }
 
@@ -101,14 +101,14 @@ estimation::Information rows_information(std::span<const Observations> runs) {
 }
 
 estimation::DatumOptions datum_options(std::span<const Observations> runs, const Options& options) {
-  return {.weight = options.gauge_weight, .label = [runs](std::size_t unknown) {
+  return {.weight = options.datum_weight, .label = [runs](std::size_t unknown) {
             return RunUnknowns(runs).label(runs.front(), unknown);
           }};
 }
 
 Result<int> linearise_runs(ObservedRuns& runs, const Noise& noise, const Options& options) {
   const RunUnknowns unknowns(runs.observations);
-  const estimation::Datum gauge = gauge_of_runs(runs.observations.front().basis, unknowns.size());
+  const estimation::Datum datum = datum_of_runs(runs.observations.front().basis, unknowns.size());
   Eigen::VectorXd at = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(unknowns.size()));
 
   for (int adjustments = 1; adjustments <= options.max_adjustments; ++adjustments) {
@@ -116,7 +116,7 @@ Result<int> linearise_runs(ObservedRuns& runs, const Noise& noise, const Options
 
     const estimation::Information data = information_of_runs(runs.observations);
     const Result<Eigen::VectorXd> U =
-        gauge.estimate(data, datum_options(runs.observations, options));
+        datum.estimate(data, datum_options(runs.observations, options));
     ABBE_TRY(U);
     if (change_in_u(*U - at, data) < options.adjustment_tolerance) {
       return adjustments;
@@ -131,7 +131,7 @@ Result<int> linearise_runs(ObservedRuns& runs, const Noise& noise, const Options
   }
 
   return failure(ErrorCode::NotConverged,
-                 message("joint adjustment of ", runs.observations.size(),
+                 message("common adjustment of ", runs.observations.size(),
                          " runs: no convergence after ", options.max_adjustments,
                          " adjustments; check that paths, points and target offsets belong "
                          "together"));

@@ -6,21 +6,21 @@
 #include <span>
 #include <vector>
 
-#include "abbe/calib/internal/otf/observe/aligned_blocks.hpp"
+#include "abbe/calib/internal/otf/observe/aligned_segments.hpp"
 #include "abbe/calib/otf/identify/targets.hpp"
 
 namespace abbe::calib::otf {
 
-/// Observations of all runs, and the blocks they are made of (empty in standstill mode).
+/// Observations of all runs, and the segments they are made of (empty in standstill mode).
 struct ObservedRuns {
   std::vector<Observations> observations;
-  std::vector<BlockSeries> series;
+  std::vector<SegmentSeries> series;
 };
 
 /// NotFinite; DegenerateGeometry if the offsets are on a line.
 [[nodiscard]] Result<void> check_targets(std::span<const TargetRun> runs);
 
-/// An error of observe() or aligned_blocks() names its run.
+/// An error of observe() or aligned_segments() names its run.
 [[nodiscard]] Result<ObservedRuns> observe_runs(std::span<const TargetRun> runs,
                                                 const Machine& machine, const Noise& noise,
                                                 const Options& options);

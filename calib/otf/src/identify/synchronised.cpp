@@ -66,18 +66,19 @@ Result<Identification> without_along(const std::string& why,
   return id;
 }
 
-/// Blocks whose row along the travel is off by seven standard deviations, while those of most
-/// blocks beside them are not: what is wrong for longer is a fault of the readings and no outlier.
+/// Segments whose row along the travel is off by seven standard deviations, while those of most
+/// segments beside them are not: what is wrong for longer is a fault of the readings and no
+/// outlier.
 /// Empty if more than 5 % of the rows are off.
-std::vector<std::size_t> blocks_off(const Identification& id) {
+std::vector<std::size_t> segments_off(const Identification& id) {
   constexpr double kOff = 7.0, kMostShare = 0.05;
   constexpr std::size_t kLongest = 3;
   const Observations& o = id.observations;
-  std::vector<std::size_t> blocks;
+  std::vector<std::size_t> segments;
   std::vector<double> times;  // standard deviations
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (is_along(o.rows[i])) {
-      blocks.push_back(o.rows[i].block);
+      segments.push_back(o.rows[i].segment);
       times.push_back(std::abs(id.solution.residuals.after_m[i]) / o.rows[i].sigma_m);
     }
   }
@@ -89,8 +90,8 @@ std::vector<std::size_t> blocks_off(const Identification& id) {
     for (end = begin; end < times.size() && times[end] > limit; ++end) {
     }
     if (end - begin <= kLongest) {
-      off.insert(off.end(), blocks.begin() + static_cast<std::ptrdiff_t>(begin),
-                 blocks.begin() + static_cast<std::ptrdiff_t>(end));
+      off.insert(off.end(), segments.begin() + static_cast<std::ptrdiff_t>(begin),
+                 segments.begin() + static_cast<std::ptrdiff_t>(end));
     }
   }
   const bool few =
@@ -107,7 +108,7 @@ void add_notes(Observations& o, const AlongRows& along, std::size_t jumps, std::
   if (!along.left_out().empty()) {
     o.notes.push_back(
         message("scale readings: ", along.left_out().size(),
-                " blocks do not fit along the travel (seven standard deviations), and "
+                " segments do not fit along the travel (seven standard deviations), and "
                 "this component of them was not used"));
   }
   if (along.sigma_factor() > 1.0) {
@@ -153,11 +154,12 @@ Result<Identification> at_corrected_clock(
 }  // namespace
 
 Result<Identification> identify_synchronised(
-    const Observations& across, const BlockSeries& series, const Noise& noise,
+    const Observations& across, const SegmentSeries& series, const Noise& noise,
     const Options& options, const std::function<Result<Identification>(AlongRows*)>& estimate) {
   ABBE_TRY(check(*options.encoders));
   if (!(series.period_s > 0.0)) {
-    return failure(ErrorCode::BadInput, "scale readings: the blocks of the tracker have no times");
+    return failure(ErrorCode::BadInput,
+                   "scale readings: the segments of the tracker have no times");
   }
   const WithoutJumps kept = without_jumps(*options.encoders);
   const EncoderLog& log = kept.log ? *kept.log : *options.encoders;
@@ -170,7 +172,7 @@ Result<Identification> identify_synchronised(
   const std::size_t rows = first.rows.size() - across.rows.size();
   if (rows < kFewestRows) {
     return without_along(
-        message("only ", rows, " blocks have readings at constant speed, needs ", kFewestRows),
+        message("only ", rows, " segments have readings at constant speed, needs ", kFewestRows),
         estimate);
   }
 
@@ -185,7 +187,7 @@ Result<Identification> identify_synchronised(
       return id;
     }
 
-    if (const std::vector<std::size_t> off = blocks_off(*id); !off.empty() && round < kRounds) {
+    if (const std::vector<std::size_t> off = segments_off(*id); !off.empty() && round < kRounds) {
       along.leave_out(off);
       continue;
     }

@@ -12,10 +12,10 @@
 namespace abbe::calib::otf {
 
 /// `estimate`: the solution with these rows along the travel, or without (null). Errors of
-/// check(EncoderLog) and `estimate`; BadInput for blocks without times; AlignmentFailed if the
+/// check(EncoderLog) and `estimate`; BadInput for segments without times; AlignmentFailed if the
 /// readings are not those of this run.
 [[nodiscard]] Result<Identification> identify_synchronised(
-    const Observations& across, const BlockSeries&, const Noise&, const Options&,
+    const Observations& across, const SegmentSeries&, const Noise&, const Options&,
     const std::function<Result<Identification>(AlongRows*)>& estimate);
 
 }  // namespace abbe::calib::otf

@@ -71,8 +71,8 @@ Statistics statistics_of_all(std::span<const Statistics> runs, const Adjustment&
   for (const Statistics& run : runs) {
     s.samples += run.samples;
     s.lost_samples += run.lost_samples;
-    s.blocks += run.blocks;
-    s.blocks_used += run.blocks_used;
+    s.segments += run.segments;
+    s.segments_used += run.segments_used;
     s.observations += run.observations;
     s.chi2 += run.chi2;
     s.correlation = std::max(s.correlation, run.correlation);
@@ -83,7 +83,7 @@ Statistics statistics_of_all(std::span<const Statistics> runs, const Adjustment&
 
   s.unknowns = unknowns;
   s.rank = a.rank;
-  s.gauge_conditions = a.datum_defect;
+  s.datum_conditions = a.datum_defect;
   s.condition = a.condition;
   s.degrees_of_freedom = s.observations - s.rank;
   s.chi2_per_dof = s.chi2 / static_cast<double>(s.degrees_of_freedom);
@@ -180,14 +180,14 @@ std::optional<FoundMisfit> misfit_of_runs(std::span<const Observations> runs,
   std::vector<ResidualsOfRun> all;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     all.push_back({runs[k], residuals[k].after_m, unknowns.of_run(k),
-                   statistics.correlation * block_distance(runs[k])});
+                   statistics.correlation * segment_distance(runs[k])});
   }
   return find_misfit(all, of_noise, Q);
 }
 
 Result<Adjustment> adjust_runs(std::span<const Observations> runs, const Options& options) {
   const estimation::Information rows = rows_information(runs);
-  Result<Adjustment> a = gauge_of_runs(runs.front().basis, rows.unknowns())
+  Result<Adjustment> a = datum_of_runs(runs.front().basis, rows.unknowns())
                              .solve(with_priors(rows, runs.front()), datum_options(runs, options));
   if (a && runs.front().smoothness) {
     a->rank = determined_by(rows, a->cofactor_Q);
@@ -385,7 +385,7 @@ Result<TargetsIdentification> identify_targets(std::span<const TargetRun> runs,
   ABBE_TRY(observed);
 
   int adjustments = 1;
-  if (options.estimator == Estimator::Joint && options.mode == Mode::OnTheFly) {
+  if (options.estimator == Estimator::Simultaneous && options.mode == Mode::OnTheFly) {
     const Result<int> linearised = linearise_runs(*observed, noise, options);
     ABBE_TRY(linearised);
     adjustments = *linearised;

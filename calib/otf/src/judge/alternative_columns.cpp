@@ -22,7 +22,7 @@ AlternativeColumns::AlternativeColumns(const Observations& o)
   for (const Observation& row : o.rows) {
     centre_m_ += row.axis_position_m / static_cast<double>(o.rows.size());
   }
-  last_block_ = static_cast<double>(std::max<std::size_t>(1, o.rows.back().block));
+  last_segment_ = static_cast<double>(std::max<std::size_t>(1, o.rows.back().segment));
 }
 
 void AlternativeColumns::rigid(const Observation& row, Values& v) const {
@@ -44,14 +44,14 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
   switch (added.cause) {
     case Cause::Moved:
       rigid(row, v);
-      return row.block >= added.place ? kRigid : 0;
+      return row.segment >= added.place ? kRigid : 0;
     case Cause::Drift: {
       rigid(row, v);
       for (Eigen::Index k = 0; k < 3; ++k) {
         v[kRigid + static_cast<std::size_t>(k)] =
             row.direction(k) * (row.axis_position_m(k) - centre_m_(k));
       }
-      const double time = static_cast<double>(row.block) / last_block_ - 0.5;  // of the run
+      const double time = static_cast<double>(row.segment) / last_segment_ - 0.5;  // of the run
       for (std::size_t k = 0; k < kDrift; ++k) {
         v[k] *= time;
       }
@@ -90,7 +90,7 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
       return 1;
     case Cause::RangeStep:
       v[0] = drow_drange_offset(o_, row);
-      return row.block >= added.place ? 1 : 0;
+      return row.segment >= added.place ? 1 : 0;
     default:
       return 0;
   }
@@ -107,10 +107,10 @@ AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> res
   Values v{};
 
   for (std::size_t i = 0; i < rows; ++i) {
-    const bool new_block = i == 0 || o_.rows[i].block != o_.rows[i - 1].block;
-    if (new_block && i / stride > before.size() && i >= kMargin * stride &&
+    const bool new_segment = i == 0 || o_.rows[i].segment != o_.rows[i - 1].segment;
+    if (new_segment && i / stride > before.size() && i >= kMargin * stride &&
         i + kMargin * stride <= rows) {
-      before.emplace_back(Added{Cause::Moved, o_.rows[i].block}, sum);
+      before.emplace_back(Added{Cause::Moved, o_.rows[i].segment}, sum);
     }
     rigid(o_.rows[i], v);
     sum.add(o_.rows[i], o_.A.row(i), residual_m[i], std::span(v).first(kRigid));
@@ -136,13 +136,13 @@ AlternativeColumns::Family AlternativeColumns::range_steps(
   Values v{};
 
   for (std::size_t i = 0; i < o_.rows.size(); ++i) {
-    const std::size_t block = o_.rows[i].block;
-    if (next != o_.beam_returned.end() && *next <= block) {
-      while (next != o_.beam_returned.end() && *next <= block) {
+    const std::size_t segment = o_.rows[i].segment;
+    if (next != o_.beam_returned.end() && *next <= segment) {
+      while (next != o_.beam_returned.end() && *next <= segment) {
         ++next;
       }
       if (i > 0 && after.size() < kMostBreaks) {
-        after.emplace_back(Added{Cause::RangeStep, block}, AddedColumns(1, o_.unknowns()));
+        after.emplace_back(Added{Cause::RangeStep, segment}, AddedColumns(1, o_.unknowns()));
       }
     }
     if (!after.empty()) {
@@ -202,12 +202,12 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
   switch (added.cause) {
     case Cause::Moved: {
       const auto at = std::find_if(o_.rows.begin(), o_.rows.end(), [&](const Observation& row) {
-        return row.block >= added.place;
+        return row.segment >= added.place;
       });
       return message("the tracker or the machine moved by ", 1e6 * shift.norm(), " um and ",
                      1e6 * d.segment<3>(3).norm(), " urad (at the centre of the path) ",
                      stands ? "before position " : "on leg ", at == o_.rows.end() ? 0 : at->leg,
-                     stands ? " (standstill " : " (block ", added.place, ")");
+                     stands ? " (standstill " : " (segment ", added.place, ")");
     }
     case Cause::Drift:
       return message("the tracker or the machine drifts: by ", 1e6 * shift.norm(), " um, ",
@@ -233,11 +233,11 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
                      " um: home position or reflector");
     case Cause::RangeStep: {
       const auto at = std::find_if(o_.rows.begin(), o_.rows.end(), [&](const Observation& row) {
-        return row.block >= added.place;
+        return row.segment >= added.place;
       });
       return message("the ranges of the tracker changed by ", 1e6 * d(0),
                      " um at a beam break, or where samples are excluded, before leg ",
-                     at == o_.rows.end() ? 0 : at->leg, " (block ", added.place,
+                     at == o_.rows.end() ? 0 : at->leg, " (segment ", added.place,
                      "): the distance was set again");
     }
     default:

@@ -15,7 +15,7 @@
 
 namespace abbe::calib::otf {
 
-/// One alternative. `place`: for Cause::Moved and Cause::RangeStep the index of the first block
+/// One alternative. `place`: for Cause::Moved and Cause::RangeStep the index of the first segment
 /// after the motion or the beam break, for other causes the index of the vertex or of the leg.
 struct Added {
   Cause cause;
@@ -47,7 +47,7 @@ class AlternativeColumns {
 
   const Observations& o_;
   Vector3 centre_m_ = Vector3::Zero();
-  double last_block_ = 1.0;
+  double last_segment_ = 1.0;
   std::vector<AxisTravel> direction_;  ///< by leg or position
 };
 

@@ -74,14 +74,14 @@ Result<FittedFold> fit_fold(const RunByFold& first, const estimation::Informatio
                             std::size_t unknowns,
                             const std::function<bool(const Observation&)>& take,
                             const Options& options) {
-  const estimation::Datum gauge = gauge_of_runs(first.o.basis, unknowns);
+  const estimation::Datum datum = datum_of_runs(first.o.basis, unknowns);
   if (!first.drift) {
-    return gauge.estimate(training, {.weight = options.gauge_weight}).map([](Eigen::VectorXd U) {
+    return datum.estimate(training, {.weight = options.datum_weight}).map([](Eigen::VectorXd U) {
       return FittedFold{std::move(U)};
     });
   }
 
-  const Result<Adjustment> a = gauge.solve(training, {.weight = options.gauge_weight});
+  const Result<Adjustment> a = datum.solve(training, {.weight = options.datum_weight});
   ABBE_TRY(a);
   FittedFold fitted{a->U};
   Result<Eigen::VectorXd> change = first.drift->correct(fitted.U, *a, take, options.stopped);

@@ -63,7 +63,7 @@ struct Fit {
   RigidFreeNorm norm;
   double u_white_m = 0.0;
 
-  /// chi2 in excess of the noise between neighbouring blocks.
+  /// chi2 in excess of the noise between neighbouring segments.
   [[nodiscard]] double excess() const {
     return chi2 - static_cast<double>(degrees_of_freedom) * noise.local * noise.local;
   }
@@ -192,7 +192,7 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   const Observations other = with_basis(fit.o, *std::move(basis));
   ABBE_TRY(check_stopped(options.stopped));
 
-  const Result<Adjustment> a = adjust(information_of(other), other, options.gauge_weight);
+  const Result<Adjustment> a = adjust(information_of(other), other, options.datum_weight);
   if (!a || other.rows.size() <= a->rank) {
     return std::nullopt;
   }
@@ -391,7 +391,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
     found.insert(found.begin(),
                  {.cause = Cause::CorrelatedNoise,
                   .text = message("the residuals are correlated over ", fit.noise.correlation,
-                                  o.mode == Mode::Standstill ? " positions" : " blocks",
+                                  o.mode == Mode::Standstill ? " positions" : " segments",
                                   ": air turbulence, vibration, or an effect that is not modelled"),
                   .explained = 1.0,
                   .bias_m = 0.0,

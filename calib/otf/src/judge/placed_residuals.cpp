@@ -24,7 +24,7 @@ std::vector<PlacedResidual> placed_residuals(const Observations& o, const Residu
     placed.push_back(
         {.way_m = to_vertex_m.at(row.leg) + (row.axis_position_m - o.vertices_m.at(row.leg)).norm(),
          .leg = row.leg,
-         .time_s = o.block_s.empty() ? std::nullopt : std::optional(o.block_s.at(row.block)),
+         .time_s = o.segment_s.empty() ? std::nullopt : std::optional(o.segment_s.at(row.segment)),
          .axis_position_m = row.axis_position_m,
          .component = row.component,
          .sigma_m = row.sigma_m,

@@ -8,7 +8,7 @@
 
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/estimation/null_space.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/calib/otf/solve/backlash.hpp"
 #include "abbe/calib/statistics/root_sum_of_squares.hpp"
 #include "abbe/result/try.hpp"
@@ -23,8 +23,8 @@ constexpr double kLargestSecondOrder_m = 0.1e-6;
 constexpr double kPrior = 1e-3, kRigidPrior = 10.0 * kPrior;
 constexpr double kLargestU = 0.05 * kPrior;
 
-/// The conditions of the gauge are met within 1 nm and 1 nrad.
-constexpr double kGaugeWeight = 1e9;
+/// The conditions of the datum are met within 1 nm and 1 nrad.
+constexpr double kDatumWeight = 1e9;
 
 /// Share of an unknown in a null space, squared entry of a unit vector: rounding is below 1e-16.
 constexpr double kRoundingShare = 1e-8;
@@ -51,8 +51,8 @@ bool span_a_plane(std::span<const Vector3> points_m) {
   return squares(2) > 0.0 && squares(1) > kLeastWidth * kLeastWidth * squares(2);
 }
 
-estimation::Information with_gauge(estimation::Information data, const Eigen::MatrixXd& K) {
-  data.add_rows(kGaugeWeight * K, Eigen::VectorXd::Zero(K.rows()));
+estimation::Information with_datum(estimation::Information data, const Eigen::MatrixXd& K) {
+  data.add_rows(kDatumWeight * K, Eigen::VectorXd::Zero(K.rows()));
   return data;
 }
 
@@ -85,7 +85,7 @@ double factor_of(const estimation::Information& data, const Eigen::VectorXd& U, 
 }
 
 /// A relative change s of all ranges, or of the scale of an axis, changes the positioning tables by
-/// s (q - reference): they meet the gauge, and the rest of the change is a rigid motion.
+/// s (q - reference): they meet the datum, and the rest of the change is a rigid motion.
 double scale_effect(const ErrorMotion& motion, const AxisNodes& nodes, std::size_t node,
                     const Noise& noise) {
   if (!is_positioning(motion)) {
@@ -233,10 +233,10 @@ Result<TablesSoFar> RunningEstimate::tables() const {
       Eigen::VectorXd::Constant(static_cast<Eigen::Index>(data.unknowns()), kPrior);
   prior.segment<kRigidUnknowns>(rigid_at).setConstant(kRigidPrior);
 
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G2, basis_, data.unknowns());
-  const estimation::Information in_gauge = with_gauge(data, K);
-  const estimation::NullSpace unseen = estimation::null_space(in_gauge);
-  const Estimate estimate = regular_estimate(in_gauge, prior);
+  const Eigen::MatrixXd K = datum_conditions(ModelDatum::G2, basis_, data.unknowns());
+  const estimation::Information in_datum = with_datum(data, K);
+  const estimation::NullSpace unseen = estimation::null_space(in_datum);
+  const Estimate estimate = regular_estimate(in_datum, prior);
 
   TablesSoFar result;
   result.samples = moments_->samples();

@@ -11,7 +11,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Covariance of the drift at two times relative to the datum, in units of the duration.
+/// Covariance of the drift at two times relative to the zero, in units of the duration.
 double prior_covariance(double s, double t, DriftCourse course) {
   const double rate = s * t;
   const bool curved = course == DriftCourse::Curved;
@@ -57,8 +57,8 @@ std::array<std::optional<DriftBasis::Share>, 2> DriftBasis::shares(double time_s
   const std::array weights{1.0 - interval.tau, interval.tau};
   for (std::size_t side = 0; side < 2; ++side) {
     const std::size_t knot = interval.before + side;
-    if (knot != d_.datum && weights[side] != 0.0) {
-      found[side] = Share{modes_ * (knot > d_.datum ? knot - 1 : knot), weights[side]};
+    if (knot != d_.zero && weights[side] != 0.0) {
+      found[side] = Share{modes_ * (knot > d_.zero ? knot - 1 : knot), weights[side]};
     }
   }
   return found;
@@ -119,8 +119,8 @@ Eigen::MatrixXd DriftBasis::root_of_prior(DriftCourse course) const {
   const double duration_s = d_.knots_s.back() - d_.knots_s.front();
   std::vector<double> times;
   for (std::size_t i = 0; i < d_.knots_s.size(); ++i) {
-    if (i != d_.datum) {
-      times.push_back((d_.knots_s[i] - d_.knots_s[d_.datum]) / duration_s);
+    if (i != d_.zero) {
+      times.push_back((d_.knots_s[i] - d_.knots_s[d_.zero]) / duration_s);
     }
   }
 

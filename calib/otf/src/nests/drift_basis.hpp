@@ -1,6 +1,6 @@
 #pragma once
 /// The functions of time of which the drift of the tracker consists (tracker_drift.hpp), and their
-/// prior. Coefficients are ordered by knot, without the datum: translation x, y, z, then rotation
+/// prior. Coefficients are ordered by knot, without the zero: translation x, y, z, then rotation
 /// x, y, z if there is one; all in m (a rotation times DriftObservations::length_m).
 
 #include <Eigen/Core>

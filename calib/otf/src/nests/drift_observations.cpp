@@ -90,9 +90,9 @@ bool determine_rotation(const NestVisits& nests, const std::vector<std::size_t>&
   return false;
 }
 
-/// Evenly spaced times from begin to end, and at `datum_s` between them.
+/// Evenly spaced times from begin to end, and at `zero_s` between them.
 void set_knots(DriftObservations& d, double begin_s, double end_s, std::size_t count) {
-  const double datum_s = d.visits.front().time_s, duration_s = end_s - begin_s;
+  const double zero_s = d.visits.front().time_s, duration_s = end_s - begin_s;
   const auto between = [&](double from_s, double to_s) {
     const double share = (to_s - from_s) / duration_s;
     const auto steps = std::max(1L, std::lround(share * static_cast<double>(count)));
@@ -103,18 +103,18 @@ void set_knots(DriftObservations& d, double begin_s, double end_s, std::size_t c
   };
 
   constexpr double kNegligible = 1e-3;
-  if (datum_s - begin_s > kNegligible * duration_s) {
-    between(begin_s, datum_s);
+  if (zero_s - begin_s > kNegligible * duration_s) {
+    between(begin_s, zero_s);
   }
-  d.datum = d.knots_s.size();
-  between(datum_s, end_s);
+  d.zero = d.knots_s.size();
+  between(zero_s, end_s);
   d.knots_s.push_back(end_s);
 }
 
 DriftObservations drift_of(const RunTimes& times, const NestVisits& nests,
                            const std::vector<std::size_t>& visits, const NestOptions& options) {
   constexpr std::size_t kFewestKnots = 32, kMostKnots = 64;
-  DriftObservations d{.block_s = times.of_block_s,
+  DriftObservations d{.segment_s = times.of_segment_s,
                       .visits = nests.found,
                       .names = nests.names,
                       .u_repeatability_m = options.u_repeatability_m,

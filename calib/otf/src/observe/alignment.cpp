@@ -16,10 +16,10 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Polyline of the measured path: start, means of the blocks that have samples, end.
-std::vector<Vector3> measured_polyline(const BlockSeries& series) {
+/// Polyline of the measured path: start, means of the segments that have samples, end.
+std::vector<Vector3> measured_polyline(const SegmentSeries& series) {
   std::vector<Vector3> points{series.start_tracker_m};
-  for (const Block& b : series.blocks) {
+  for (const Segment& b : series.segments) {
     if (b.samples > 0) {
       points.push_back(b.mean_tracker_m);
     }
@@ -28,21 +28,21 @@ std::vector<Vector3> measured_polyline(const BlockSeries& series) {
   return points;
 }
 
-Result<void> check(const BlockSeries& series, const Path& path) {
+Result<void> check(const SegmentSeries& series, const Path& path) {
   if (Result<void> valid = check(path); !valid) {
     return valid;
   }
-  if (std::count_if(series.blocks.begin(), series.blocks.end(),
-                    [](const Block& b) { return b.usable; }) < 4) {
-    return failure(ErrorCode::TooFewObservations, "alignment: fewer than 4 usable blocks");
+  if (std::count_if(series.segments.begin(), series.segments.end(),
+                    [](const Segment& b) { return b.usable; }) < 4) {
+    return failure(ErrorCode::TooFewObservations, "alignment: fewer than 4 usable segments");
   }
   return {};
 }
 
 /// Rough alignment [Sanders 2023] section 1.2.3: the measured start is placed on the nominal start,
 /// then rotated for the best fit of end and centroid.
-Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured, const Path& path,
-                             const Centroid& nominal, const Vector3& t) {
+Result<RigidTransform> rough(const SegmentSeries& series, const Centroid& measured,
+                             const Path& path, const Centroid& nominal, const Vector3& t) {
   const Vector3& start = path.vertices_m.front();
   const Vector3 to_centre = nominal.centre_m - start, to_end = path.vertices_m.back() - start;
   const Vector3 m_centre = measured.centre_m - series.start_tracker_m;
@@ -53,12 +53,13 @@ Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured
   });
 }
 
-/// Axis positions of all blocks with the transform T; NaN for blocks without samples (beam lost).
-std::vector<Vector3> axis_positions(const BlockSeries& series, const RigidTransform& T,
+/// Axis positions of all segments with the transform T; NaN for segments without samples (beam
+/// lost).
+std::vector<Vector3> axis_positions(const SegmentSeries& series, const RigidTransform& T,
                                     const Vector3& t) {
   std::vector<Vector3> points;
-  points.reserve(series.blocks.size());
-  for (const Block& b : series.blocks) {
+  points.reserve(series.segments.size());
+  for (const Segment& b : series.segments) {
     points.push_back(b.samples > 0
                          ? Vector3(T * b.mean_tracker_m - t)
                          : Vector3(Vector3::Constant(std::numeric_limits<double>::quiet_NaN())));
@@ -66,17 +67,17 @@ std::vector<Vector3> axis_positions(const BlockSeries& series, const RigidTransf
   return points;
 }
 
-/// Pairs of measured points and closest nominal points of the used blocks (usable, outside the
+/// Pairs of measured points and closest nominal points of the used segments (usable, outside the
 /// corners).
 struct Pairs {
   std::vector<Vector3> measured_m, nominal_m;
   std::vector<bool> used;
   double rms_m = 0.0;
   double farthest_m = 0.0;
-  std::size_t farthest_block = 0;
+  std::size_t farthest_segment = 0;
 };
 
-Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
+Pairs pair_up(const SegmentSeries& series, std::span<const Vector3> points,
               std::span<const std::size_t> leg, const Path& path, const Vector3& t,
               double corner_m) {
   Pairs pairs;
@@ -84,7 +85,7 @@ Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
   double squares = 0.0;
 
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!series.blocks[i].usable) {
+    if (!series.segments[i].usable) {
       continue;
     }
     const Vector3 &from = path.vertices_m[leg[i]], &to = path.vertices_m[leg[i] + 1];
@@ -93,13 +94,13 @@ Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
       continue;
     }
     pairs.used[i] = true;
-    pairs.measured_m.push_back(series.blocks[i].mean_tracker_m);
+    pairs.measured_m.push_back(series.segments[i].mean_tracker_m);
     pairs.nominal_m.push_back(closest.closest_m + t);
     const double distance = (points[i] - closest.closest_m).norm();
     squares += distance * distance;
     if (distance > pairs.farthest_m) {
       pairs.farthest_m = distance;
-      pairs.farthest_block = i;
+      pairs.farthest_segment = i;
     }
   }
 
@@ -109,12 +110,13 @@ Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
 }
 
 /// Upper bound of the travel in beam breaks that the polyline of the measured points does not
-/// contain, because it takes the shortest way: the travel of as many other blocks, each with the
+/// contain, because it takes the shortest way: the travel of as many other segments, each with the
 /// mean travel of the polyline.
-double travel_in_breaks_m(const BlockSeries& series, double measured_m) {
-  const auto has_samples = [](const Block& b) { return b.samples > 0; };
-  const auto first = std::find_if(series.blocks.begin(), series.blocks.end(), has_samples);
-  const auto last = std::find_if(series.blocks.rbegin(), series.blocks.rend(), has_samples).base();
+double travel_in_breaks_m(const SegmentSeries& series, double measured_m) {
+  const auto has_samples = [](const Segment& b) { return b.samples > 0; };
+  const auto first = std::find_if(series.segments.begin(), series.segments.end(), has_samples);
+  const auto last =
+      std::find_if(series.segments.rbegin(), series.segments.rend(), has_samples).base();
   const auto all = std::distance(first, last);
   const auto with_samples = std::count_if(first, last, has_samples);
   return measured_m * static_cast<double>(all - with_samples) / static_cast<double>(with_samples);
@@ -137,7 +139,7 @@ tl::unexpected<Error> does_not_fit(const std::string& what, double is_m, double 
                          " mm: the points do not fit this path"));
 }
 
-Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries& series,
+Result<void> check_fit(const Alignment& a, const Pairs& pairs, const SegmentSeries& series,
                        const Path& path, const Vector3& t, const Options& options) {
   if (!(pairs.rms_m <= options.max_alignment_rms_m)) {
     return does_not_fit("rms distance to the path", pairs.rms_m, options.max_alignment_rms_m);
@@ -145,8 +147,8 @@ Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries
 
   const double limit_m = options.max_alignment_distance_m;
   if (pairs.farthest_m > limit_m) {
-    return does_not_fit(message("distance of block ", pairs.farthest_block, " to leg ",
-                                a.leg[pairs.farthest_block]),
+    return does_not_fit(message("distance of segment ", pairs.farthest_segment, " to leg ",
+                                a.leg[pairs.farthest_segment]),
                         pairs.farthest_m, limit_m);
   }
 
@@ -168,7 +170,7 @@ Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries
 
 /// Fine alignment by iterative closest points: [Sanders 2023] section 1.2.3. `pairs` receives the
 /// pairs of the last iteration.
-Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const Path& path,
+Result<void> refine(Alignment& a, Pairs& pairs, const SegmentSeries& series, const Path& path,
                     const Vector3& t, const Options& options) {
   double previous_rms_m = 0.0;
   for (int update = 0;; ++update) {
@@ -206,7 +208,7 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
   }
 }
 
-Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machine,
+Result<Alignment> align_as_given(const SegmentSeries& series, const Machine& machine,
                                  const Path& path, const Options& options) {
   ABBE_TRY(check(series, path));
 
@@ -262,8 +264,8 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
 
 namespace {
 
-BlockSeries with_longer_ranges(BlockSeries series, double longer_m) {
-  for (Block& b : series.blocks) {
+SegmentSeries with_longer_ranges(SegmentSeries series, double longer_m) {
+  for (Segment& b : series.segments) {
     b.mean_tracker_m = with_longer_range(b.mean_tracker_m, longer_m);
   }
   series.start_tracker_m = with_longer_range(series.start_tracker_m, longer_m);
@@ -273,7 +275,7 @@ BlockSeries with_longer_ranges(BlockSeries series, double longer_m) {
 
 /// "; they fit with ranges shorter by 19.05 mm (...)"; empty if no change of the ranges makes the
 /// points fit.
-std::string range_change_that_fits(const BlockSeries& series, const Machine& machine,
+std::string range_change_that_fits(const SegmentSeries& series, const Machine& machine,
                                    const Path& path, const Options& options) {
   Options loose = options;
   loose.max_alignment_rms_m = loose.max_alignment_distance_m =
@@ -320,7 +322,7 @@ std::string corrections_that_fit(const Path& path, const MachineNodes& travel,
   return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
-Result<Alignment> align(const BlockSeries& series, const Machine& machine, const Path& path,
+Result<Alignment> align(const SegmentSeries& series, const Machine& machine, const Path& path,
                         const Options& options) {
   Result<Alignment> a = align_as_given(series, machine, path, options);
   const bool stopped = options.stopped && options.stopped();

@@ -9,14 +9,14 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Speed of a block along its leg.
-struct BlockSpeed {
+/// Speed of a segment along its leg.
+struct SegmentSpeed {
   double v_m_s = 0.0;
   double u_m_s = 0.0;
 };
 
-/// Decides which blocks were measured at constant speed: block and both neighbours on its leg have
-/// the median speed of the leg, within 2 % and four standard uncertainties. Where the machine
+/// Decides which segments were measured at constant speed: segment and both neighbours on its leg
+/// have the median speed of the leg, within 2 % and four standard uncertainties. Where the machine
 /// accelerates, following errors and the delay of the tracker change.
 class ConstantSpeed {
  public:
@@ -34,11 +34,12 @@ class ConstantSpeed {
     leg_ = leg;
   }
 
-  [[nodiscard]] bool holds(std::size_t block) const {
+  [[nodiscard]] bool holds(std::size_t segment) const {
     const auto is_constant = [&](std::size_t i) {
-      return i < constant_.size() && leg_[i] == leg_[block] && constant_[i];
+      return i < constant_.size() && leg_[i] == leg_[segment] && constant_[i];
     };
-    return block > 0 && is_constant(block - 1) && is_constant(block) && is_constant(block + 1);
+    return segment > 0 && is_constant(segment - 1) && is_constant(segment) &&
+           is_constant(segment + 1);
   }
 
  private:
@@ -77,13 +78,13 @@ double sample_variance_m2(const Vector3& direction, const Vector3& beam_m, const
          across_m * across_m * (1.0 - cosine * cosine);
 }
 
-/// The readings at the time of every usable block.
-std::vector<std::optional<EncoderLine>> lines_of_blocks(const EncoderLines& lines,
-                                                        const BlockSeries& series,
-                                                        const RunClock& clock) {
-  std::vector<std::optional<EncoderLine>> all(series.blocks.size());
+/// The readings at the time of every usable segment.
+std::vector<std::optional<EncoderLine>> lines_of_segments(const EncoderLines& lines,
+                                                          const SegmentSeries& series,
+                                                          const RunClock& clock) {
+  std::vector<std::optional<EncoderLine>> all(series.segments.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const Block& b = series.blocks[i];
+    const Segment& b = series.segments[i];
     if (b.usable) {
       all[i] = lines.line(clock.since_start_s(b.first_s - 0.5 * series.period_s),
                           clock.since_start_s(b.time_s),
@@ -114,14 +115,14 @@ void AlongRows::correct_clock(const Eigen::VectorXd& by) {
   }
 }
 
-void AlongRows::leave_out(std::span<const std::size_t> blocks) {
-  left_out_.insert(left_out_.end(), blocks.begin(), blocks.end());
+void AlongRows::leave_out(std::span<const std::size_t> segments) {
+  left_out_.insert(left_out_.end(), segments.begin(), segments.end());
   std::sort(left_out_.begin(), left_out_.end());
 }
 
-Observations AlongRows::added_to(const Observations& across, const BlockSeries& series,
+Observations AlongRows::added_to(const Observations& across, const SegmentSeries& series,
                                  const Noise& noise) const {
-  const auto lines = lines_of_blocks(lines_, series, clock_);
+  const auto lines = lines_of_segments(lines_, series, clock_);
   const ConstantSpeed constant(across, lines, log_->sigma_time_s);
   Observations o = across;
   o.A = {};
@@ -131,31 +132,31 @@ Observations AlongRows::added_to(const Observations& across, const BlockSeries& 
   for (std::size_t i = 0; i < across.rows.size(); i += 2) {
     append_copies(o, across, i, i + 2);
     const Observation &row = across.rows[i], &other = across.rows[i + 1];
-    if (!constant.holds(row.block) ||
-        std::binary_search(left_out_.begin(), left_out_.end(), row.block)) {
+    if (!constant.holds(row.segment) ||
+        std::binary_search(left_out_.begin(), left_out_.end(), row.segment)) {
       continue;
     }
 
-    const Block& block = series.blocks[row.block];
-    const EncoderLine& line = *lines[row.block];
+    const Segment& segment = series.segments[row.segment];
+    const EncoderLine& line = *lines[row.segment];
     const RigidTransform& T = across.alignment.T_machine_tracker;
     const Vector3 a1 = row.direction.cross(other.direction);  // a2 x a3
     const double v_m_s = a1.dot(line.v_m_s), late_m = v_m_s * log_->sigma_time_s;
     const double variance_m2 =
-        sample_variance_m2(a1, T.R * block.mean_tracker_m, noise) / block.effective_samples() +
+        sample_variance_m2(a1, T.R * segment.mean_tracker_m, noise) / segment.effective_samples() +
         late_m * late_m * line.variance;
     const std::array<SparseRows::Entry, kClockUnknowns> clock{
         {{o.clock_offset(), v_m_s},
-         {o.clock_offset() + 1, v_m_s * (block.time_s - clock_.reference_s)}}};
+         {o.clock_offset() + 1, v_m_s * (segment.time_s - clock_.origin_s)}}};
 
     const std::vector<Vector3> sub_points_m(
         across.sub_points_m.begin() + static_cast<std::ptrdiff_t>(row.first_sub_point),
         across.sub_points_m.begin() +
             static_cast<std::ptrdiff_t>(row.first_sub_point + row.sub_points));
-    const Vector3 deviation_m = T * block.mean_tracker_m - across.target_offset_m - line.q_m;
+    const Vector3 deviation_m = T * segment.mean_tracker_m - across.target_offset_m - line.q_m;
     const MeasuredComponent along{a1, sigma_factor_ * std::sqrt(variance_m2),
                                   std::span(clock).first(o.clock_unknowns)};
-    append_rows(o, {row.leg, row.block, deviation_m, row.axis_position_m, {}, 1.0}, sub_points_m,
+    append_rows(o, {row.leg, row.segment, deviation_m, row.axis_position_m, {}, 1.0}, sub_points_m,
                 std::span(&along, 1));
     o.rows.back().component = kAlong;
   }

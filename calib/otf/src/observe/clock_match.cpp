@@ -12,7 +12,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// A used block: place and direction of travel at a time of the tracker.
+/// A used segment: place and direction of travel at a time of the tracker.
 struct TimedPoint {
   double time_s = 0.0;
   Vector3 q_m = Vector3::Zero();
@@ -26,16 +26,16 @@ constexpr double kTravelPerStep_m = 2e-3;  ///< between two offsets that are com
 /// Limits of the distances of the points to the readings: median, and 95 % of them. The gate
 /// accepts errors up to 1 mm.
 constexpr double kMedianLimit_m = 1e-3, kLimit_m = 3e-3;
-constexpr double kLeastCovered = 0.25;  ///< share of the used blocks whose time the log contains
+constexpr double kLeastCovered = 0.25;  ///< share of the used segments whose time the log contains
 
-std::vector<TimedPoint> timed_points(const Observations& across, const BlockSeries& series) {
+std::vector<TimedPoint> timed_points(const Observations& across, const SegmentSeries& series) {
   std::vector<TimedPoint> points;
   const RigidTransform& T = across.alignment.T_machine_tracker;
-  for (std::size_t i = 0; i < series.blocks.size(); ++i) {
+  for (std::size_t i = 0; i < series.segments.size(); ++i) {
     if (across.alignment.used[i]) {
       const std::size_t leg = across.alignment.leg[i];
-      points.push_back({series.blocks[i].time_s,
-                        T * series.blocks[i].mean_tracker_m - across.target_offset_m,
+      points.push_back({series.segments[i].time_s,
+                        T * series.segments[i].mean_tracker_m - across.target_offset_m,
                         (across.vertices_m[leg + 1] - across.vertices_m[leg]).normalized()});
     }
   }
@@ -158,7 +158,7 @@ void correct(RunClock& clock, std::span<const PointToLog> all) {
                late2_s = median_of(half, near.size(), &PointToLog::late_s);
   const double drift = (late2_s - late1_s) / (t2_s - t1_s);
   clock.drift += drift;
-  clock.lag_s += late1_s - drift * (t1_s - clock.reference_s);
+  clock.lag_s += late1_s - drift * (t1_s - clock.origin_s);
 }
 
 /// How well the readings fit with the best clock.
@@ -192,8 +192,7 @@ ClockFit fit_at(const RunClock& clock, std::span<const TimedPoint> points,
   return fit;
 }
 
-ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines,
-                  double reference_s) {
+ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines, double origin_s) {
   constexpr std::size_t kCompared = 400;  // points determine an offset to 10 ms many times over
   std::vector<TimedPoint> few;
   const std::size_t stride = std::max<std::size_t>(1, points.size() / kCompared);
@@ -203,8 +202,8 @@ ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines,
 
   const double step_s = kTravelPerStep_m / std::max(1e-4, median_speed_m_s(points));
   RunClock clock{
-      .lag_s = SteppedLog(lines, step_s).best_start_s(few) - (few.front().time_s - reference_s),
-      .reference_s = reference_s,
+      .lag_s = SteppedLog(lines, step_s).best_start_s(few) - (few.front().time_s - origin_s),
+      .origin_s = origin_s,
       .log_start_s = lines.log_start_s()};
   constexpr int kCorrections = 4;  // each leaves a tenth, then the errors of the machine
   for (int i = 0; i < kCorrections; ++i) {
@@ -215,14 +214,14 @@ ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines,
 
 /// Names the mistakes in the readings whose correction makes them fit.
 std::string mistakes_that_fit(std::span<const TimedPoint> points, const EncoderLog& log,
-                              double reference_s) {
+                              double origin_s) {
   std::vector<std::string> texts;
   const auto try_with = [&](const Matrix3& M, const std::string& text) {
     std::vector<EncoderReading> readings = log.readings;
     for (EncoderReading& r : readings) {
       r.q_m = M * r.q_m;
     }
-    if (best_fit(points, EncoderLines(readings), reference_s).is_good()) {
+    if (best_fit(points, EncoderLines(readings), origin_s).is_good()) {
       texts.push_back(text);
     }
   };
@@ -240,14 +239,14 @@ std::string mistakes_that_fit(std::span<const TimedPoint> points, const EncoderL
 }  // namespace
 
 Result<RunClock> match_clocks(const EncoderLog& log, const Observations& across,
-                              const BlockSeries& series) {
+                              const SegmentSeries& series) {
   const std::vector<TimedPoint> points = timed_points(across, series);
   const EncoderLines lines(log.readings);
-  const double reference_s = series.first_time_s;
+  const double origin_s = series.first_time_s;
   const ClockFit fit =
       log.known_clock
-          ? fit_at(RunClock::of(*log.known_clock, reference_s, lines.log_start_s()), points, lines)
-          : best_fit(points, lines, reference_s);
+          ? fit_at(RunClock::of(*log.known_clock, origin_s, lines.log_start_s()), points, lines)
+          : best_fit(points, lines, origin_s);
   if (fit.is_good()) {
     return fit.clock;
   }
@@ -255,7 +254,7 @@ Result<RunClock> match_clocks(const EncoderLog& log, const Observations& across,
   if (fit.median_m <= kMedianLimit_m && fit.share_95_m <= kLimit_m) {
     return failure(ErrorCode::AlignmentFailed,
                    message("scale readings: they contain the times of ", 100.0 * fit.covered,
-                           " % of the blocks only, needs ", 100.0 * kLeastCovered, " %"));
+                           " % of the segments only, needs ", 100.0 * kLeastCovered, " %"));
   }
 
   const std::string where =
@@ -268,7 +267,7 @@ Result<RunClock> match_clocks(const EncoderLog& log, const Observations& across,
       ErrorCode::AlignmentFailed,
       message("scale readings: ", where, " they ", how, " from the tracker's points, limits ",
               1e3 * kMedianLimit_m, " and ", 1e3 * kLimit_m, " mm",
-              log.known_clock ? "" : mistakes_that_fit(points, log, reference_s)));
+              log.known_clock ? "" : mistakes_that_fit(points, log, origin_s)));
 }
 
 }  // namespace abbe::calib::otf

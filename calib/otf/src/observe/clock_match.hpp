@@ -12,6 +12,6 @@ namespace abbe::calib::otf {
 /// text names reversed or swapped axes and other units of length that would fit. A known clock is
 /// only checked.
 [[nodiscard]] Result<RunClock> match_clocks(const EncoderLog&, const Observations& across,
-                                            const BlockSeries&);
+                                            const SegmentSeries&);
 
 }  // namespace abbe::calib::otf

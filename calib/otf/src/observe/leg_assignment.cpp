@@ -36,8 +36,8 @@ double squared_distance(const AssignableLeg& leg, const Vector3& p) {
   return (r - along * leg.direction).squaredNorm();
 }
 
-/// Cost of a block on a leg. A lost block costs nothing on any leg; a block without direction of
-/// travel costs only its squared distance.
+/// Cost of a segment on a leg. A lost segment costs nothing on any leg; a segment without direction
+/// of travel costs only its squared distance.
 double cost(const AssignableLeg& leg, const Vector3& p, const Vector3& travel, double direction_m) {
   if (!p.allFinite()) {
     return 0.0;
@@ -55,15 +55,15 @@ Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, 
   const std::size_t n = points_m.size(), m = legs.size();
   if (m == 0 || n < m) {
     return failure(ErrorCode::TooFewObservations,
-                   message("leg assignment: ", n, " blocks for ", m,
-                           " legs, needs at least one block per leg"));
+                   message("leg assignment: ", n, " segments for ", m,
+                           " legs, needs at least one segment per leg"));
   }
 
-  // Viterbi algorithm for n blocks and m legs. best[j]: least cost of blocks 0..i with block i on
-  // leg j; block i - 1 is then on leg j or j - 1. n - m of the n blocks are on the same leg as the
-  // block before, therefore
+  // Viterbi algorithm for n segments and m legs. best[j]: least cost of segments 0..i with segment
+  // i on leg j; segment i - 1 is then on leg j or j - 1. n - m of the n segments are on the same
+  // leg as the segment before, therefore
   //     j <= i <= j + n - m.
-  // `advanced` has one bit for each such pair (i, j): block i - 1 is on leg j - 1.
+  // `advanced` has one bit for each such pair (i, j): segment i - 1 is on leg j - 1.
   std::vector<double> best(m, std::numeric_limits<double>::infinity());
   const std::size_t stays = n - m;
   std::vector<bool> advanced(m * (stays + 1), false);
@@ -72,8 +72,8 @@ Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, 
 
   for (std::size_t i = 1; i < n; ++i) {
     const Vector3 travel = chord(points_m, i);
-    // Skip legs that block i cannot have reached, and legs from which the remaining blocks cannot
-    // reach the last leg.
+    // Skip legs that segment i cannot have reached, and legs from which the remaining segments
+    // cannot reach the last leg.
     const std::size_t highest = std::min(m - 1, i), lowest = i > stays ? i - stays : 0;
     for (std::size_t j = highest + 1; j-- > lowest;) {
       const bool from_before = j > 0 && best[j - 1] < best[j];

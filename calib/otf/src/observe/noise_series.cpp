@@ -20,19 +20,19 @@ NoiseResponse response_of(const Observations& o, const Observation& row) {
           row.component == kAlong ? 1.0 / row.sigma_m : 0.0};
 }
 
-/// Duration of a block: median time from one to the next; 1 for blocks without times.
-double block_duration(const std::vector<double>& block_s) {
+/// Duration of a segment: median time from one to the next; 1 for segments without times.
+double segment_duration(const std::vector<double>& segment_s) {
   std::vector<double> periods_s;
-  for (std::size_t i = 1; i < block_s.size(); ++i) {
-    periods_s.push_back(block_s[i] - block_s[i - 1]);
+  for (std::size_t i = 1; i < segment_s.size(); ++i) {
+    periods_s.push_back(segment_s[i] - segment_s[i - 1]);
   }
   return periods_s.empty() ? 1.0 : median(periods_s);
 }
 
-double travel_per_block_m(const NoiseSeries& all, const Observations& o) {
+double travel_per_segment_m(const NoiseSeries& all, const Observations& o) {
   std::vector<double> travel_m;
-  for (std::size_t i = 1; i < all.blocks.size(); ++i) {
-    const NoiseBlock &a = all.blocks[i - 1], &b = all.blocks[i];
+  for (std::size_t i = 1; i < all.segments.size(); ++i) {
+    const NoiseSegment &a = all.segments[i - 1], &b = all.segments[i];
     if (a.leg == b.leg) {
       travel_m.push_back(
           (o.rows[b.first_row].axis_position_m - o.rows[a.first_row].axis_position_m).norm());
@@ -44,18 +44,18 @@ double travel_per_block_m(const NoiseSeries& all, const Observations& o) {
 }  // namespace
 
 NoiseSeries noise_series(const Observations& o) {
-  const double duration = block_duration(o.block_s);
+  const double duration = segment_duration(o.segment_s);
   NoiseSeries series;
   series.sources = kNoiseSources - 1;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Observation& row = o.rows[i];
-    if (i == 0 || row.block != o.rows[i - 1].block) {
+    if (i == 0 || row.segment != o.rows[i - 1].segment) {
       const double middle =
-          o.block_s.empty() ? static_cast<double>(row.block) : o.block_s[row.block];
-      series.blocks.push_back(
+          o.segment_s.empty() ? static_cast<double>(row.segment) : o.segment_s[row.segment];
+      series.segments.push_back(
           {middle - 0.5 * duration, middle + 0.5 * duration, row.leg, i, std::size_t{0}});
     }
-    ++series.blocks.back().rows;
+    ++series.segments.back().rows;
     series.response.push_back(response_of(o, row));
     if (row.component == kAlong) {
       series.sources = kNoiseSources;
@@ -67,23 +67,23 @@ NoiseSeries noise_series(const Observations& o) {
 GroupedSeries grouped(const NoiseSeries& all, const Observations& o, double group_m) {
   GroupedSeries g;
   g.series.sources = all.sources;
-  const double gap = 0.5 * all.block_duration();
-  const double block_m = travel_per_block_m(all, o);
-  const auto at_m = [&](const NoiseBlock& b) { return o.rows[b.first_row].axis_position_m; };
+  const double gap = 0.5 * all.segment_duration();
+  const double segment_m = travel_per_segment_m(all, o);
+  const auto at_m = [&](const NoiseSegment& b) { return o.rows[b.first_row].axis_position_m; };
   Vector3 first_m = Vector3::Zero();
-  for (const NoiseBlock& b : all.blocks) {
-    const bool continues = !g.series.blocks.empty() && b.leg == g.series.blocks.back().leg &&
-                           b.rows == g.series.blocks.back().rows &&
-                           b.begin - g.series.blocks.back().end < gap &&
-                           (at_m(b) - first_m).norm() < group_m - 0.5 * block_m;
+  for (const NoiseSegment& b : all.segments) {
+    const bool continues = !g.series.segments.empty() && b.leg == g.series.segments.back().leg &&
+                           b.rows == g.series.segments.back().rows &&
+                           b.begin - g.series.segments.back().end < gap &&
+                           (at_m(b) - first_m).norm() < group_m - 0.5 * segment_m;
     if (!continues) {
       first_m = at_m(b);
-      g.series.blocks.push_back({b.begin, b.end, b.leg, g.rows.size(), b.rows});
+      g.series.segments.push_back({b.begin, b.end, b.leg, g.rows.size(), b.rows});
       g.rows.resize(g.rows.size() + b.rows);
     }
-    g.series.blocks.back().end = b.end;
+    g.series.segments.back().end = b.end;
     for (std::size_t k = 0; k < b.rows; ++k) {
-      g.rows[g.series.blocks.back().first_row + k].push_back(b.first_row + k);
+      g.rows[g.series.segments.back().first_row + k].push_back(b.first_row + k);
     }
   }
 

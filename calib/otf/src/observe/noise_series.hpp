@@ -15,27 +15,29 @@ inline constexpr std::size_t kNoiseSources = 4;
 using NoiseResponse = std::array<double, kNoiseSources>;
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Rows of consecutive blocks whose means over [begin, end] are known.
-struct NoiseBlock {
-  double begin = 0.0, end = 0.0;  ///< s; in units of a block for blocks without times
+/// Rows of consecutive segments whose means over [begin, end] are known.
+struct NoiseSegment {
+  double begin = 0.0, end = 0.0;  ///< s; in units of a segment for segments without times
   std::size_t leg = 0;
   std::size_t first_row = 0, rows = 0;
 };
 
 /// Rows in units of their white noise.
 struct NoiseSeries {
-  std::vector<NoiseBlock> blocks;
+  std::vector<NoiseSegment> segments;
   std::vector<NoiseResponse> response;  ///< by row: change per m or rad of the source
   std::size_t sources = kNoiseSources;  ///< used
 
-  [[nodiscard]] double duration() const { return blocks.back().end - blocks.front().begin; }
-  [[nodiscard]] double block_duration() const { return blocks.front().end - blocks.front().begin; }
+  [[nodiscard]] double duration() const { return segments.back().end - segments.front().begin; }
+  [[nodiscard]] double segment_duration() const {
+    return segments.front().end - segments.front().begin;
+  }
 };
 /// For observations with rows.
 [[nodiscard]] NoiseSeries noise_series(const Observations&);
 
-/// Sums over groups of blocks that adjoin on a leg, divided by the root of their number: the white
-/// noise keeps its variance.
+/// Sums over groups of segments that adjoin on a leg, divided by the root of their number: the
+/// white noise keeps its variance.
 struct GroupedSeries {
   NoiseSeries series;
   std::vector<std::vector<std::size_t>> rows;  ///< rows of each sum
@@ -43,7 +45,7 @@ struct GroupedSeries {
   /// The same sums of other values of the rows.
   [[nodiscard]] RowMatrix sums(const RowMatrix& of_rows) const;
 };
-/// The blocks of a group travel at most `group_m`; one block alone if it travels more.
+/// The segments of a group travel at most `group_m`; one segment alone if it travels more.
 [[nodiscard]] GroupedSeries grouped(const NoiseSeries&, const Observations&, double group_m);
 
 }  // namespace abbe::calib::otf

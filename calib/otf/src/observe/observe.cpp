@@ -66,13 +66,13 @@ MeanColumns mean_columns(const Observations& o, std::size_t leg,
   return mean;
 }
 
-/// Median travel from one usable block to the next; 0 without two such blocks.
-double travel_per_block_m(const BlockSeries& series) {
+/// Median travel from one usable segment to the next; 0 without two such segments.
+double travel_per_segment_m(const SegmentSeries& series) {
   std::vector<double> travel_m;
-  for (std::size_t i = 0; i + 1 < series.blocks.size(); ++i) {
-    if (series.blocks[i].usable && series.blocks[i + 1].usable) {
+  for (std::size_t i = 0; i + 1 < series.segments.size(); ++i) {
+    if (series.segments[i].usable && series.segments[i + 1].usable) {
       travel_m.push_back(
-          (series.blocks[i + 1].mean_tracker_m - series.blocks[i].mean_tracker_m).norm());
+          (series.segments[i + 1].mean_tracker_m - series.segments[i].mean_tracker_m).norm());
     }
   }
 
@@ -81,22 +81,22 @@ double travel_per_block_m(const BlockSeries& series) {
 
 }  // namespace
 
-Result<void> check_travel(const BlockSeries& series, const Options& options) {
-  const double travel_m = travel_per_block_m(series), most_m = 2.0 * options.corner_m;
+Result<void> check_travel(const SegmentSeries& series, const Options& options) {
+  const double travel_m = travel_per_segment_m(series), most_m = 2.0 * options.corner_m;
   if (travel_m <= most_m) {
     return {};
   }
 
   const double too_far = travel_m / most_m;
-  const double most_samples = std::floor(static_cast<double>(options.block_samples) / too_far);
+  const double most_samples = std::floor(static_cast<double>(options.segment_samples) / too_far);
   if (most_samples >= 1.0) {
     return failure(ErrorCode::BadInput,
-                   message("tracker blocks: ", options.block_samples, " samples travel ",
+                   message("tracker segments: ", options.segment_samples, " samples travel ",
                            1e3 * travel_m, " mm, limit ", 1e3 * most_m, " mm: use at most ",
-                           most_samples, " samples per block"));
+                           most_samples, " samples per segment"));
   }
 
-  const double between_m = travel_m / static_cast<double>(options.block_samples);
+  const double between_m = travel_m / static_cast<double>(options.segment_samples);
   const double more_points = std::ceil(10.0 * between_m / most_m) / 10.0;
   return failure(ErrorCode::BadInput,
                  message("tracker: the points are ", 1e3 * between_m, " mm apart, limit ",
@@ -106,29 +106,29 @@ Result<void> check_travel(const BlockSeries& series, const Options& options) {
 
 namespace {
 
-PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a, const Path& path,
-                          const Vector3& t, const Noise& noise) {
+PointOnPath point_on_path(const Segment& segment, std::size_t i, const Alignment& a,
+                          const Path& path, const Vector3& t, const Noise& noise) {
   const Vector3 &from = path.vertices_m[a.leg[i]], &to = path.vertices_m[a.leg[i] + 1];
-  const Vector3 q = a.T_machine_tracker * block.mean_tracker_m - t;
+  const Vector3 q = a.T_machine_tracker * segment.mean_tracker_m - t;
   const Vector3 closest = closest_on_leg(from, to, q).closest_m;
   // Measured points are relative to the tracker, so that rotating them to machine coordinates gives
   // the vector of the beam.
-  const Vector3 beam_m = a.T_machine_tracker.R * block.mean_tracker_m;
+  const Vector3 beam_m = a.T_machine_tracker.R * segment.mean_tracker_m;
   return {a.leg[i],
           i,
           q - closest,
           closest,
           path_frame(to - from, beam_m, noise),
-          block.effective_samples()};
+          segment.effective_samples()};
 }
 
-std::vector<Vector3> sub_points(const BlockSeries& series, std::size_t i, const Alignment& a,
+std::vector<Vector3> sub_points(const SegmentSeries& series, std::size_t i, const Alignment& a,
                                 const Path& path, const Vector3& t) {
   const Vector3 &from = path.vertices_m[a.leg[i]], &to = path.vertices_m[a.leg[i] + 1];
   std::vector<Vector3> points;
   points.reserve(series.sub_points);
   for (std::size_t k = 0; k < series.sub_points; ++k) {
-    const Vector3& p = series.sub_points_tracker_m[series.blocks[i].first_sub_point + k];
+    const Vector3& p = series.sub_points_tracker_m[series.segments[i].first_sub_point + k];
     points.push_back(closest_on_leg(from, to, a.T_machine_tracker * p - t).closest_m);
   }
   return points;
@@ -219,7 +219,7 @@ void append_rows(Observations& o, const PointOnPath& point, std::span<const Vect
     row.insert(row.end(), c.clock.begin(), c.clock.end());
     o.A.append(row);
     o.rows.push_back({c.direction.dot(point.deviation_m), c.sigma_m, 1.0 / (c.sigma_m * c.sigma_m),
-                      point.leg, point.block, c.direction, point.axis_position_m, first,
+                      point.leg, point.segment, c.direction, point.axis_position_m, first,
                       sub_points_m.size(), component++});
   }
 }
@@ -276,7 +276,7 @@ Observations with_basis(const Observations& o, TableBasis basis) {
 
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Observation& row = o.rows[i];
-    // The rows of a block have the same sub-points and the same columns.
+    // The rows of a segment have the same sub-points and the same columns.
     if (i == 0 || row.first_sub_point != o.rows[i - 1].first_sub_point) {
       columns = mean_columns(
           other, row.leg, std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
@@ -293,8 +293,9 @@ Observations with_basis(const Observations& o, TableBasis basis) {
   return other;
 }
 
-Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine,
-                                    const Path& path, const Noise& noise, const Options& options) {
+Result<Observations> observe_segments(const SegmentSeries& series, const Machine& machine,
+                                      const Path& path, const Noise& noise,
+                                      const Options& options) {
   Result<void> valid = check(noise);
   if (valid) {
     valid = check_travel(series, options);
@@ -306,7 +307,7 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   });
 }
 
-Result<Observations> observe_aligned(const BlockSeries& series, Alignment alignment,
+Result<Observations> observe_aligned(const SegmentSeries& series, Alignment alignment,
                                      const Machine& machine, const Path& path, const Noise& noise,
                                      const Options& options) {
   Result<Observations> empty =
@@ -320,24 +321,24 @@ Result<Observations> observe_aligned(const BlockSeries& series, Alignment alignm
   ABBE_TRY(first_leg);
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
-  o.blocks = series.blocks.size();
+  o.segments = series.segments.size();
   if (series.period_s > 0.0) {
-    o.block_s = times_of(series).of_block_s;
+    o.segment_s = times_of(series).of_segment_s;
   }
   o.beam_returned = series.beam_returned;
   o.set_aside = series.set_aside;
 
-  for (std::size_t i = 0; i < series.blocks.size(); ++i) {
+  for (std::size_t i = 0; i < series.segments.size(); ++i) {
     o.alignment.used[i] = o.alignment.used[i] && o.alignment.leg[i] >= *first_leg;
     if (o.alignment.used[i]) {
       append_rows(o,
-                  point_on_path(series.blocks[i], i, o.alignment, path, o.target_offset_m, noise),
+                  point_on_path(series.segments[i], i, o.alignment, path, o.target_offset_m, noise),
                   sub_points(series, i, o.alignment, path, o.target_offset_m));
-      ++o.blocks_used;
+      ++o.segments_used;
     }
     if ((i + 1) % 1000 == 0) {
       report(options, Stage::Observe,
-             static_cast<double>(i + 1) / static_cast<double>(series.blocks.size()));
+             static_cast<double>(i + 1) / static_cast<double>(series.segments.size()));
       ABBE_TRY(check_stopped(options.stopped));
     }
   }

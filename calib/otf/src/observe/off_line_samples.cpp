@@ -21,14 +21,14 @@ struct PointAcross {
   Across across{};
 };
 
-/// The points of a block and of blocks beside it, in the path frame of this block.
-class FrameOfBlock {
+/// The points of a segment and of segments beside it, in the path frame of this segment.
+class FrameOfSegment {
  public:
-  FrameOfBlock(const Block& block, std::size_t leg, const Alignment& a, const Vector3& t,
-               const Path& path, const Noise& noise)
+  FrameOfSegment(const Segment& segment, std::size_t leg, const Alignment& a, const Vector3& t,
+                 const Path& path, const Noise& noise)
       : T_(a.T_machine_tracker), origin_m_(path.vertices_m[leg] + t) {
     const Vector3 d = path.vertices_m[leg + 1] - path.vertices_m[leg];
-    const PathFrame frame = path_frame(d, T_.R * block.mean_tracker_m, noise);
+    const PathFrame frame = path_frame(d, T_.R * segment.mean_tracker_m, noise);
     axes_ << frame.a1, frame.a2 / frame.sigma2_m, frame.a3 / frame.sigma3_m;
   }
 
@@ -43,15 +43,15 @@ class FrameOfBlock {
   Matrix3 axes_;  ///< columns: a1, a2 / sigma2, a3 / sigma3
 };
 
-/// How far the samples of a block, or its mean, are from where they should be.
-struct BlockScatter {
-  Across mad{}, farthest{};  ///< from the median of the block
+/// How far the samples of a segment, or its mean, are from where they should be.
+struct SegmentScatter {
+  Across mad{}, farthest{};  ///< from the median of the segment
   Across off_means{};        ///< distance of its mean from the line through those before and after
 };
 
 class OffLineSearch {
  public:
-  OffLineSearch(std::span<const TrackerObservation> samples, const BlockSeries& series,
+  OffLineSearch(std::span<const TrackerObservation> samples, const SegmentSeries& series,
                 const Alignment& alignment, const Vector3& t, const Path& path, const Noise& noise)
       : samples_(samples),
         series_(series),
@@ -59,7 +59,7 @@ class OffLineSearch {
         t_(t),
         path_(path),
         noise_(noise) {
-    for (std::size_t i = 0; i < series.blocks.size(); ++i) {
+    for (std::size_t i = 0; i < series.segments.size(); ++i) {
       if (alignment.used[i]) {
         used_.push_back(i);
       }
@@ -68,7 +68,7 @@ class OffLineSearch {
 
   [[nodiscard]] OffLine found() {
     scan();
-    const std::vector<bool> suspicious = suspicious_blocks();
+    const std::vector<bool> suspicious = suspicious_segments();
     OffLine found;
     for (std::size_t k = 0; k < used_.size(); ++k) {
       if (suspicious[k]) {
@@ -79,24 +79,24 @@ class OffLineSearch {
   }
 
  private:
-  [[nodiscard]] FrameOfBlock frame(std::size_t k) const {
-    return {series_.blocks[used_[k]], alignment_.leg[used_[k]], alignment_, t_, path_, noise_};
+  [[nodiscard]] FrameOfSegment frame(std::size_t k) const {
+    return {series_.segments[used_[k]], alignment_.leg[used_[k]], alignment_, t_, path_, noise_};
   }
   [[nodiscard]] bool on_same_leg(std::size_t k, std::size_t other) const {
     return other < used_.size() && alignment_.leg[used_[k]] == alignment_.leg[used_[other]];
   }
 
-  /// Used block `next` is on the leg of block k, with at most one block that is not used between
-  /// them.
+  /// Used segment `next` is on the leg of segment k, with at most one segment that is not used
+  /// between them.
   [[nodiscard]] bool follows(std::size_t k, std::size_t next) const {
     return on_same_leg(k, next) && used_[next] - used_[k] <= 2;
   }
 
-  /// Appends the valid samples of used block k; `index` receives their indices.
-  void append(const FrameOfBlock& in, std::size_t k, std::vector<PointAcross>& points,
+  /// Appends the valid samples of used segment k; `index` receives their indices.
+  void append(const FrameOfSegment& in, std::size_t k, std::vector<PointAcross>& points,
               std::vector<std::size_t>* index = nullptr) const {
-    const Block& block = series_.blocks[used_[k]];
-    for (std::size_t i = block.begin_sample; i < block.end_sample; ++i) {
+    const Segment& segment = series_.segments[used_[k]];
+    for (std::size_t i = segment.begin_sample; i < segment.end_sample; ++i) {
       if (samples_[i].valid) {
         points.push_back(in.point(samples_[i].p_tracker_m));
         if (index != nullptr) {
@@ -106,10 +106,10 @@ class OffLineSearch {
     }
   }
 
-  [[nodiscard]] BlockScatter scatter_of(std::size_t k) const {
+  [[nodiscard]] SegmentScatter scatter_of(std::size_t k) const {
     std::vector<PointAcross> points;
     append(frame(k), k, points);
-    BlockScatter scatter;
+    SegmentScatter scatter;
     std::vector<double> values;
 
     for (std::size_t c = 0; c < kAcross; ++c) {
@@ -129,38 +129,39 @@ class OffLineSearch {
     return scatter;
   }
 
-  /// Scatter of every block; `scale_` becomes the noise of the run. Blocks of fewer than kEnough
-  /// samples show it by their means, of which one and its two neighbours have the variance 1.5 / n.
+  /// Scatter of every segment; `scale_` becomes the noise of the run. Segments of fewer than
+  /// kEnough samples show it by their means, of which one and its two neighbours have the variance
+  /// 1.5 / n.
   void scan() {
     constexpr std::size_t kEnough = 5;
     constexpr double kOfMeans = 1.5;
-    std::array<std::vector<double>, kAcross> of_blocks;
+    std::array<std::vector<double>, kAcross> of_segments;
 
     for (std::size_t k = 0; k < used_.size(); ++k) {
       scatter_.push_back(scatter_of(k));
-      const std::size_t n = series_.blocks[used_[k]].samples;
+      const std::size_t n = series_.segments[used_[k]].samples;
       for (std::size_t c = 0; c < kAcross; ++c) {
         const double by_means =
             scatter_[k].off_means[c] * std::sqrt(static_cast<double>(n) / kOfMeans);
         if (n >= kEnough || by_means > 0.0) {
-          of_blocks[c].push_back(kMadToSigma * (n >= kEnough ? scatter_[k].mad[c] : by_means));
+          of_segments[c].push_back(kMadToSigma * (n >= kEnough ? scatter_[k].mad[c] : by_means));
         }
       }
     }
 
     for (std::size_t c = 0; c < kAcross; ++c) {
-      scale_[c] = std::max(1.0, median(of_blocks[c]));
+      scale_[c] = std::max(1.0, median(of_segments[c]));
     }
   }
 
-  /// Distance of the mean of block k from the line through the means before and after.
+  /// Distance of the mean of segment k from the line through the means before and after.
   [[nodiscard]] Across off_means(std::size_t k) const {
     if (k == 0 || !follows(k - 1, k) || !follows(k, k + 1)) {
       return {};
     }
-    const FrameOfBlock in = frame(k);
+    const FrameOfSegment in = frame(k);
     const auto mean = [&](std::size_t i) {
-      return in.point(series_.blocks[used_[i]].mean_tracker_m);
+      return in.point(series_.segments[used_[i]].mean_tracker_m);
     };
     const PointAcross before = mean(k - 1), here = mean(k), after = mean(k + 1);
     const double span_m = after.along_m - before.along_m;
@@ -173,8 +174,8 @@ class OffLineSearch {
     return off;
   }
 
-  /// One value for each used block: it must be compared with a line.
-  [[nodiscard]] std::vector<bool> suspicious_blocks() const {
+  /// One value for each used segment: it must be compared with a line.
+  [[nodiscard]] std::vector<bool> suspicious_segments() const {
     constexpr double kOffLine = 5.0;
     std::vector<bool> all(used_.size(), false);
     for (std::size_t k = 0; k < used_.size(); ++k) {
@@ -193,26 +194,26 @@ class OffLineSearch {
     return all;
   }
 
-  /// Range [begin, end) of used blocks of the leg around k: five, or as many as have enough samples
-  /// for a line, at most nine.
+  /// Range [begin, end) of used segments of the leg around k: five, or as many as have enough
+  /// samples for a line, at most nine.
   [[nodiscard]] std::pair<std::size_t, std::size_t> window(std::size_t k) const {
-    constexpr std::size_t kBlocks = 5, kMostBlocks = 9;
-    std::size_t begin = k, end = k + 1, count = series_.blocks[used_[k]].samples;
-    while (end - begin < kBlocks || (end - begin < kMostBlocks && count < RobustLine::kParts)) {
+    constexpr std::size_t kSegments = 5, kMostSegments = 9;
+    std::size_t begin = k, end = k + 1, count = series_.segments[used_[k]].samples;
+    while (end - begin < kSegments || (end - begin < kMostSegments && count < RobustLine::kParts)) {
       const bool can_begin = begin > 0 && follows(begin - 1, begin),
                  can_end = follows(end - 1, end);
       if (!can_begin && !can_end) {
         break;
       }
       const bool grow_begin = can_begin && (!can_end || k - begin < end - k);
-      count += series_.blocks[used_[grow_begin ? --begin : end++]].samples;
+      count += series_.segments[used_[grow_begin ? --begin : end++]].samples;
     }
     return {begin, end};
   }
 
   void compare_with_line(std::size_t k, OffLine& found) const {
     constexpr std::size_t kFewest = 9;
-    const FrameOfBlock in = frame(k);
+    const FrameOfSegment in = frame(k);
     const auto [begin, end] = window(k);
     std::vector<PointAcross> around, own;
     std::vector<std::size_t> index;
@@ -238,7 +239,7 @@ class OffLineSearch {
     }
     constexpr double kNoisy = 3.0;
     if (noise_factor > kNoisy) {
-      found.blocks.push_back({used_[k], noise_factor});
+      found.segments.push_back({used_[k], noise_factor});
     }
   }
 
@@ -272,19 +273,19 @@ class OffLineSearch {
   }
 
   std::span<const TrackerObservation> samples_;
-  const BlockSeries& series_;
+  const SegmentSeries& series_;
   const Alignment& alignment_;
   const Vector3& t_;
   const Path& path_;
   const Noise& noise_;
-  std::vector<std::size_t> used_;  ///< indices of the used blocks
-  std::vector<BlockScatter> scatter_;
+  std::vector<std::size_t> used_;  ///< indices of the used segments
+  std::vector<SegmentScatter> scatter_;
   Across scale_{};
 };
 
 }  // namespace
 
-OffLine off_line_samples(std::span<const TrackerObservation> samples, const BlockSeries& series,
+OffLine off_line_samples(std::span<const TrackerObservation> samples, const SegmentSeries& series,
                          const Alignment& alignment, const Vector3& target_offset_m,
                          const Path& path, const Noise& noise) {
   return OffLineSearch(samples, series, alignment, target_offset_m, path, noise).found();

@@ -1,25 +1,25 @@
 #pragma once
-/// Second step of aligned_blocks(): samples off the line through their neighbours.
+/// Second step of aligned_segments(): samples off the line through their neighbours.
 
 #include <span>
 #include <vector>
 
 #include "abbe/calib/otf/observe/alignment.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 
 namespace abbe::calib::otf {
 
 struct OffLine {
   std::vector<std::size_t> samples;  ///< indices, ascending
   struct Noisy {
-    std::size_t block = 0;
+    std::size_t segment = 0;
     double noise_factor = 1.0;
   };
-  std::vector<Noisy> blocks;
+  std::vector<Noisy> segments;
 };
-/// `series`: blocks of `samples`.
+/// `series`: segments of `samples`.
 [[nodiscard]] OffLine off_line_samples(std::span<const TrackerObservation> samples,
-                                       const BlockSeries& series, const Alignment&,
+                                       const SegmentSeries& series, const Alignment&,
                                        const Vector3& target_offset_m, const Path&, const Noise&);
 
 }  // namespace abbe::calib::otf

@@ -15,7 +15,7 @@ namespace {
 /// variance.
 constexpr double kVarianceOffNeighbours = 1.5;
 
-/// One valid sample of a block or of the blocks beside it.
+/// One valid sample of a segment or of the segments beside it.
 struct AlongSample {
   std::size_t index = 0;
   double time_s = 0.0;
@@ -24,15 +24,15 @@ struct AlongSample {
 
 class OffTimeSearch {
  public:
-  OffTimeSearch(std::span<const TrackerObservation> samples, const BlockSeries& series,
+  OffTimeSearch(std::span<const TrackerObservation> samples, const SegmentSeries& series,
                 const Alignment& a, const Path& path, const Noise& noise)
       : samples_(samples), series_(series), a_(a), path_(path), noise_(noise) {}
 
   [[nodiscard]] std::vector<std::size_t> found() const {
-    const std::vector<std::size_t> blocks = at_constant_speed();
-    const double scale = noise_of_run(blocks);
+    const std::vector<std::size_t> segments = at_constant_speed();
+    const double scale = noise_of_run(segments);
     std::vector<std::size_t> off;
-    for (const std::size_t k : blocks) {
+    for (const std::size_t k : segments) {
       compare(k, scale, off);
     }
     return off;
@@ -43,24 +43,24 @@ class OffTimeSearch {
     return (path_.vertices_m[a_.leg[k] + 1] - path_.vertices_m[a_.leg[k]]).normalized();
   }
   [[nodiscard]] bool is_used(std::size_t k, std::size_t leg) const {
-    return k < series_.blocks.size() && a_.used[k] && a_.leg[k] == leg;
+    return k < series_.segments.size() && a_.used[k] && a_.leg[k] == leg;
   }
   [[nodiscard]] bool has_neighbours(std::size_t k) const {
     return k > 0 && is_used(k - 1, a_.leg[k]) && is_used(k, a_.leg[k]) && is_used(k + 1, a_.leg[k]);
   }
-  /// Speed from block k to the next.
+  /// Speed from segment k to the next.
   [[nodiscard]] double speed_m_s(std::size_t k) const {
-    const Block &from = series_.blocks[k], &to = series_.blocks[k + 1];
+    const Segment &from = series_.segments[k], &to = series_.segments[k + 1];
     const RigidTransform& T = a_.T_machine_tracker;
     return direction(k).dot(T.R * (to.mean_tracker_m - from.mean_tracker_m)) /
            (to.time_s - from.time_s);
   }
 
-  /// Used blocks between used ones, where both speeds are that of the leg.
+  /// Used segments between used ones, where both speeds are that of the leg.
   [[nodiscard]] std::vector<std::size_t> at_constant_speed() const {
     constexpr double kSame = 0.02;
     std::vector<std::size_t> all;
-    const std::size_t n = series_.blocks.size();
+    const std::size_t n = series_.segments.size();
     for (std::size_t begin = 0, end = 0; begin < n; begin = end) {
       std::vector<double> speeds;
       for (end = begin; end < n && a_.leg[end] == a_.leg[begin]; ++end) {
@@ -79,14 +79,14 @@ class OffTimeSearch {
     return all;
   }
 
-  /// The valid samples of block k, and `more` of the blocks before and after.
+  /// The valid samples of segment k, and `more` of the segments before and after.
   [[nodiscard]] std::vector<AlongSample> samples_of(std::size_t k, std::size_t more) const {
-    const Block& block = series_.blocks[k];
-    const std::size_t begin = std::max(series_.blocks[k - 1].begin_sample,
-                                       block.begin_sample - std::min(block.begin_sample, more)),
-                      end = std::min(series_.blocks[k + 1].end_sample, block.end_sample + more);
+    const Segment& segment = series_.segments[k];
+    const std::size_t begin = std::max(series_.segments[k - 1].begin_sample,
+                                       segment.begin_sample - std::min(segment.begin_sample, more)),
+                      end = std::min(series_.segments[k + 1].end_sample, segment.end_sample + more);
     const RigidTransform& T = a_.T_machine_tracker;
-    const Vector3 d = direction(k), beam_m = T.R * block.mean_tracker_m;
+    const Vector3 d = direction(k), beam_m = T.R * segment.mean_tracker_m;
     const double range_m = beam_m.norm(), cosine = d.dot(beam_m) / range_m;
     const double sigma_m =
         root_sum_of_squares(noise_.sigma_range_m * cosine,
@@ -97,7 +97,7 @@ class OffTimeSearch {
     for (std::size_t i = begin; i < end; ++i) {
       if (samples_[i].valid) {
         all.push_back(
-            {i, samples_[i].time_s, row.dot(samples_[i].p_tracker_m - block.mean_tracker_m)});
+            {i, samples_[i].time_s, row.dot(samples_[i].p_tracker_m - segment.mean_tracker_m)});
       }
     }
     return all;
@@ -111,27 +111,27 @@ class OffTimeSearch {
   }
 
   /// Standard deviation of a sample relative to the stated one, at least 1.
-  [[nodiscard]] double noise_of_run(const std::vector<std::size_t>& blocks) const {
-    std::vector<double> of_blocks, off;
-    for (const std::size_t k : blocks) {
+  [[nodiscard]] double noise_of_run(const std::vector<std::size_t>& segments) const {
+    std::vector<double> of_segments, off;
+    for (const std::size_t k : segments) {
       const std::vector<AlongSample> all = samples_of(k, 0);
       off.clear();
       for (std::size_t i = 1; i + 1 < all.size(); ++i) {
         off.push_back(off_neighbours(all, i));
       }
       if (!off.empty()) {
-        of_blocks.push_back(median(off));
+        of_segments.push_back(median(off));
       }
     }
-    return std::max(1.0, kMadToSigma * median(of_blocks) / std::sqrt(kVarianceOffNeighbours));
+    return std::max(1.0, kMadToSigma * median(of_segments) / std::sqrt(kVarianceOffNeighbours));
   }
 
   void compare(std::size_t k, double scale, std::vector<std::size_t>& off) const {
     constexpr double kOffTime = 5.0;
-    const Block& block = series_.blocks[k];
+    const Segment& segment = series_.segments[k];
     const std::vector<AlongSample> all = samples_of(k, kBeside);
     for (std::size_t i = 1; i + 1 < all.size(); ++i) {
-      const bool own = all[i].index >= block.begin_sample && all[i].index < block.end_sample;
+      const bool own = all[i].index >= segment.begin_sample && all[i].index < segment.end_sample;
       if (own && off_neighbours(all, i) > kOffTime * std::sqrt(kVarianceOffNeighbours) * scale &&
           is_off_line(all, i, scale)) {
         off.push_back(all[i].index);
@@ -163,7 +163,7 @@ class OffTimeSearch {
   static constexpr std::size_t kBeside = RobustLine::kParts / 2;
 
   std::span<const TrackerObservation> samples_;
-  const BlockSeries& series_;
+  const SegmentSeries& series_;
   const Alignment& a_;
   const Path& path_;
   const Noise& noise_;
@@ -172,7 +172,7 @@ class OffTimeSearch {
 }  // namespace
 
 std::vector<std::size_t> off_time_samples(std::span<const TrackerObservation> samples,
-                                          const BlockSeries& series, const Alignment& alignment,
+                                          const SegmentSeries& series, const Alignment& alignment,
                                           const Path& path, const Noise& noise) {
   return OffTimeSearch(samples, series, alignment, path, noise).found();
 }

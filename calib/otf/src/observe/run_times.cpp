@@ -4,11 +4,11 @@
 
 namespace abbe::calib::otf {
 
-RunTimes times_of(const BlockSeries& series) {
+RunTimes times_of(const SegmentSeries& series) {
   RunTimes times{.begin_s = series.first_time_s, .end_s = series.first_time_s};
-  for (const Block& block : series.blocks) {
-    times.of_block_s.push_back(block.time_s);
-    times.end_s = std::max(times.end_s, block.last_s);
+  for (const Segment& segment : series.segments) {
+    times.of_segment_s.push_back(segment.time_s);
+    times.end_s = std::max(times.end_s, segment.last_s);
   }
   return times;
 }
@@ -16,7 +16,7 @@ RunTimes times_of(const BlockSeries& series) {
 RunTimes times_of(const Standstills& all) {
   RunTimes times{.begin_s = all.found.front().begin_s, .end_s = all.found.back().end_s};
   for (const Standstill& s : all.found) {
-    times.of_block_s.push_back(s.middle_s());
+    times.of_segment_s.push_back(s.middle_s());
   }
   return times;
 }

@@ -1,19 +1,19 @@
 #pragma once
-/// When a run began and ended, and the times of its blocks or standstills.
+/// When a run began and ended, and the times of its segments or standstills.
 
 #include <vector>
 
 #include "abbe/calib/internal/otf/samples/standstill.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 
 namespace abbe::calib::otf {
 
 /// Times of the tracker's clock.
 struct RunTimes {
   double begin_s = 0.0, end_s = 0.0;
-  std::vector<double> of_block_s{};  ///< by Observation::block
+  std::vector<double> of_segment_s{};  ///< by Observation::segment
 };
-[[nodiscard]] RunTimes times_of(const BlockSeries&);
+[[nodiscard]] RunTimes times_of(const SegmentSeries&);
 [[nodiscard]] RunTimes times_of(const Standstills&);
 
 }  // namespace abbe::calib::otf

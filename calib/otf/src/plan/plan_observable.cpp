@@ -8,11 +8,11 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/estimation/null_space.hpp"
-#include "abbe/calib/model/gauge.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/model/model_datum.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "abbe/calib/otf/solve/solve.hpp"
 #include "abbe/result/try.hpp"
-#include "solve/gauge_of.hpp"
+#include "solve/datum_of.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -30,7 +30,7 @@ void append_unit_rows(Observations& o, std::size_t leg, const Path& path) {
   // A beam along no leg; its length is of no importance.
   point.frame = path_frame(to - from, {0.3, 0.5, 0.8}, {});
   point.frame.sigma2_m = point.frame.sigma3_m = 1.0;
-  const auto points = static_cast<std::size_t>(std::ceil(used_m / kBlockTravel_m));
+  const auto points = static_cast<std::size_t>(std::ceil(used_m / kSegmentTravel_m));
   for (std::size_t i = 0; i < points; ++i) {
     const double along_m =
         corner_m + used_m * (static_cast<double>(i) + 0.5) / static_cast<double>(points);
@@ -46,18 +46,18 @@ void clear_rows(Observations& o) {
   o.sub_points_m.clear();
 }
 
-/// The columns of `null_space`, in gauge G2. A combination that no run determines is zero there.
-Eigen::MatrixXd in_gauge(const Observations& o, const Eigen::MatrixXd& null_space) {
+/// The columns of `null_space`, in datum G2. A combination that no run determines is zero there.
+Eigen::MatrixXd in_datum(const Observations& o, const Eigen::MatrixXd& null_space) {
   // unobservable_combinations() has no rows for differences between directions of travel.
   const Eigen::MatrixXd of_layout =
       unobservable_combinations(o.layout(), std::array{o.target_offset_m});
   const auto model = static_cast<Eigen::Index>(o.layout().model_size()),
              rigid = static_cast<Eigen::Index>(kRigidUnknowns);
-  Eigen::MatrixXd of_gauge = Eigen::MatrixXd::Zero(null_space.rows(), of_layout.cols());
-  of_gauge.topRows(model) = of_layout.topRows(model);
-  of_gauge.middleRows(static_cast<Eigen::Index>(o.rigid_offset()), rigid) =
+  Eigen::MatrixXd of_datum = Eigen::MatrixXd::Zero(null_space.rows(), of_layout.cols());
+  of_datum.topRows(model) = of_layout.topRows(model);
+  of_datum.middleRows(static_cast<Eigen::Index>(o.rigid_offset()), rigid) =
       of_layout.middleRows(model, rigid);
-  const Result<Eigen::MatrixXd> S = gauge_of(o).transformation(of_gauge);
+  const Result<Eigen::MatrixXd> S = datum_of(o).transformation(of_datum);
   return S ? Eigen::MatrixXd(*S * null_space) : null_space;
 }
 
@@ -135,7 +135,7 @@ Result<Observability> observability(const Path& path, const Machine& machine,
   const Result<std::size_t> first = first_with_backlash(o);
   ABBE_TRY(first);
 
-  const auto conditions = static_cast<std::size_t>(gauge_of(o).conditions().rows());
+  const auto conditions = static_cast<std::size_t>(datum_of(o).conditions().rows());
   Observability result{.needed = o.unknowns() - conditions, .unused = note_on_unused(o)};
   estimation::Information data = with_backlash_prior(estimation::Information(o.unknowns()), o);
 
@@ -152,7 +152,7 @@ Result<Observability> observability(const Path& path, const Machine& machine,
   }
 
   if (result.rank < result.needed) {
-    result.undetermined = names_of(o, in_gauge(o, estimation::null_space(data).basis));
+    result.undetermined = names_of(o, in_datum(o, estimation::null_space(data).basis));
   }
   return result;
 }

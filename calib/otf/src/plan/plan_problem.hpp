@@ -1,7 +1,7 @@
 #pragma once
 /// What planning evaluates very often: the information of one leg, and trace(G C) of a path.
 /// A leg is evaluated at evenly spaced points of constant speed, so that its information is a
-/// smooth function of its ends; predict() forms the blocks of a real run.
+/// smooth function of its ends; predict() forms the segments of a real run.
 
 #include <Eigen/Core>
 #include <array>

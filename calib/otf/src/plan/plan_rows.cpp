@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "abbe/calib/otf/observe/blocks.hpp"
 #include "abbe/calib/otf/observe/known_travel.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "abbe/result/try.hpp"
 
 namespace abbe::calib::otf {
@@ -55,8 +55,8 @@ struct PlannedLeg {
   bool used = true;
 };
 
-void append_block(Observations& o, const PlannedLeg& leg, std::span<const double> along_m,
-                  const PlannedRun& run, std::size_t row_points) {
+void append_segment(Observations& o, const PlannedLeg& leg, std::span<const double> along_m,
+                    const PlannedRun& run, std::size_t row_points) {
   const Vector3 q = leg.from + mean_of(along_m) * leg.direction;
   const std::size_t count = std::min(row_points, along_m.size());
   std::vector<Vector3> sub_points;
@@ -67,7 +67,7 @@ void append_block(Observations& o, const PlannedLeg& leg, std::span<const double
 
   PointOnPath point;
   point.leg = leg.number;
-  point.block = o.blocks_used++;
+  point.segment = o.segments_used++;
   point.axis_position_m = q;
   point.frame =
       path_frame(leg.direction, q + run.machine.target_offset_m - run.tracker_m, run.noise);
@@ -78,20 +78,20 @@ void append_block(Observations& o, const PlannedLeg& leg, std::span<const double
 void append_leg(Observations& o, const PlannedLeg& leg, const PlannedRun& run,
                 std::size_t row_points) {
   const double corner_m = Options{}.corner_m;
-  const std::size_t samples = block_samples_for_travel(run.drive.feed_m_per_s / run.points_per_s);
+  const std::size_t samples = segment_samples_for_travel(run.drive.feed_m_per_s / run.points_per_s);
   const std::vector<double> along_m = points_along_m(leg.length_m, run);
-  // Blocks are counted from the beginning of the run. One that extends over a vertex is not used.
+  // Segments are counted from the beginning of the run. One that extends over a vertex is not used.
   o.samples += static_cast<std::size_t>(run.drive.dwell_s * run.points_per_s);
   const std::size_t begun = o.samples % samples;
   o.samples += along_m.size();
 
   for (std::size_t first = begun == 0 ? 0 : samples - begun; first + samples <= along_m.size();
        first += samples) {
-    const auto block = std::span(along_m).subspan(first, samples);
-    const double centre_m = mean_of(block);
-    ++o.blocks;
+    const auto segment = std::span(along_m).subspan(first, samples);
+    const double centre_m = mean_of(segment);
+    ++o.segments;
     if (leg.used && centre_m >= corner_m && leg.length_m - centre_m >= corner_m) {
-      append_block(o, leg, block, run, row_points);
+      append_segment(o, leg, segment, run, row_points);
     }
   }
 }

@@ -8,8 +8,8 @@
 
 namespace abbe::calib::otf {
 
-/// Observations of the run with y = 0: blocks as make_blocks() forms them at this feed, without
-/// those near the ends of a leg. Dwells give no blocks.
+/// Observations of the run with y = 0: segments as make_segments() forms them at this feed, without
+/// those near the ends of a leg. Dwells give no segments.
 [[nodiscard]] Result<Observations> planned_observations(const Path&, const PlannedRun&,
                                                         std::size_t row_points);
 

@@ -10,7 +10,7 @@ namespace {
 
 /// The tracker needs at least this distance to see the reflector.
 constexpr double kNearest_m = 0.05;
-/// A leg of this length has blocks between the corner exclusions of its ends.
+/// A leg of this length has segments between the corner exclusions of its ends.
 constexpr double kLeastTravel_m = 0.05;
 
 struct PositiveQuantity {

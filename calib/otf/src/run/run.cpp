@@ -16,11 +16,11 @@ std::optional<Mode> mode_named(std::string_view text) {
 }
 
 std::string_view name(Estimator estimator) {
-  return estimator == Estimator::Joint ? "joint" : "two-step";
+  return estimator == Estimator::Simultaneous ? "simultaneous" : "two-step";
 }
 
 std::optional<Estimator> estimator(std::string_view name) {
-  for (const Estimator one : {Estimator::TwoStep, Estimator::Joint}) {
+  for (const Estimator one : {Estimator::TwoStep, Estimator::Simultaneous}) {
     if (name == otf::name(one)) {
       return one;
     }

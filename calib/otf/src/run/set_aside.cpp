@@ -19,9 +19,9 @@ std::string set_aside_text(const SetAside& a) {
     }
   }
 
-  if (a.noisy_blocks > 0) {
-    all += message(all.empty() ? "" : "; ", a.noisy_blocks,
-                   " blocks are noisier than the others and have a larger uncertainty");
+  if (a.noisy_segments > 0) {
+    all += message(all.empty() ? "" : "; ", a.noisy_segments,
+                   " segments are noisier than the others and have a larger uncertainty");
   }
 
   return all;

@@ -1,5 +1,5 @@
 #pragma once
-/// First step of aligned_blocks(): samples that the target cannot have reached.
+/// First step of aligned_segments(): samples that the target cannot have reached.
 
 #include <span>
 #include <vector>

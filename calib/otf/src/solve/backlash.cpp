@@ -49,7 +49,7 @@ Result<VolumetricModel> model_of(const Observations& o, std::span<const Vector3>
   }
 
   Result<VolumetricModel> model = VolumetricModel::from_vector(
-      o.basis, Gauge::G2, tool_offsets_m, U.head(n), of_tables, std::move(validity));
+      o.basis, ModelDatum::G2, tool_offsets_m, U.head(n), of_tables, std::move(validity));
   if (!model || !estimates_backlash(o)) {
     return model;
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// When an iteration of the joint adjustment has converged.
+/// When an iteration of the simultaneous adjustment has converged.
 
 #include <Eigen/Dense>
 #include <cmath>

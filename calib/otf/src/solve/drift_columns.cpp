@@ -26,7 +26,7 @@ void DriftColumns::append(const Observation& row, Entries& out) const {
   const RigidTransform& T = o_.alignment.T_machine_tracker;
   const Vector3 p_tracker_m = T.R.transpose() * (row.axis_position_m + o_.target_offset_m - T.t_m);
   const Vector3 direction = T.R.transpose() * row.direction;
-  const double time_s = o_.drift->block_s[row.block];
+  const double time_s = o_.drift->segment_s[row.segment];
   basis_.append_along(direction, time_s, p_tracker_m, offsets_, out);
   if (between_ == BetweenKnots::Walk) {
     basis_.append_between_knots(direction, time_s, p_tracker_m, offsets_ + basis_.size(), out);

@@ -11,7 +11,7 @@
 #include "abbe/calib/internal/otf/solve/prewhitening.hpp"
 #include "abbe/calib/internal/statistics/elementary.hpp"
 #include "abbe/result/try.hpp"
-#include "solve/gauge_of.hpp"
+#include "solve/datum_of.hpp"
 #include "solve/noise_whitening.hpp"
 #include "solve/priors.hpp"
 
@@ -112,7 +112,7 @@ class AboutUnknowns {
  public:
   AboutUnknowns(const Observations& o, const NoiseSeries& series,
                 std::span<const double> residual_m)
-      : o_(o), groups_(grouped(series, o, group_m(o))), K_(gauge_of(o).conditions()) {
+      : o_(o), groups_(grouped(series, o, group_m(o))), K_(datum_of(o).conditions()) {
     const auto n = static_cast<Eigen::Index>(o.unknowns());
     RowMatrix rows = RowMatrix::Zero(std::ssize(o.rows), n + 1);
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
@@ -328,11 +328,11 @@ Scored minimised(const Likelihood& likelihood, const Bounds& bounds, Parameters 
 
 Bounds bounds_for(const NoiseSeries& series, Eigen::Index variances) {
   constexpr double kLeastVariance = 1e-4, kMostVariance = 1e5;
-  // Shorter: the blocks are not correlated. Longer: a drift, which the rigid motion follows.
+  // Shorter: the segments are not correlated. Longer: a drift, which the rigid motion follows.
   constexpr double kShortest = 0.3, kLongest = 0.5;
   Bounds b{Parameters::Constant(variances + 1, natural_logarithm(kLeastVariance)),
            Parameters::Constant(variances + 1, natural_logarithm(kMostVariance))};
-  b.low(variances) = natural_logarithm(kShortest * series.block_duration());
+  b.low(variances) = natural_logarithm(kShortest * series.segment_duration());
   b.high(variances) =
       std::max(b.low(variances) + 1.0, natural_logarithm(kLongest * series.duration()));
   return b;
@@ -398,7 +398,7 @@ Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const doubl
   const Scales scales(series);
   const Bounds bounds = bounds_for(series, scales.variances());
   const AboutUnknowns unknowns(o, series, residual_m);
-  const std::size_t rank = o.unknowns() - static_cast<std::size_t>(gauge_of(o).conditions().rows());
+  const std::size_t rank = o.unknowns() - static_cast<std::size_t>(datum_of(o).conditions().rows());
   const auto freedom = [&](std::size_t rows) {
     return static_cast<double>(rows - std::min(rank, rows - 1));
   };

@@ -35,7 +35,8 @@ struct ResidualsOfRun {
   const Observations& o;
   std::span<const double> residual_m;  ///< y - A U of the rows, without range offset and drift
   std::vector<std::size_t> at;         ///< places of its unknowns among those of all runs
-  /// Over which the noise is correlated, unit of Observations::block_s (blocks without times: 1).
+  /// Over which the noise is correlated, unit of Observations::segment_s (segments without times:
+  /// 1).
   double correlation_time = 0.0;
   std::optional<TwoAxisErrors> two_axes{};  ///< subtracted from the residuals
 };

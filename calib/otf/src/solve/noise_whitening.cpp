@@ -9,7 +9,7 @@ namespace {
 
 using Matrix = std::array<std::array<double, kNoiseSources>, kNoiseSources>;
 
-/// Covariance of x at the end of a block and of the mean m over it, of the first n sources.
+/// Covariance of x at the end of a segment and of the mean m over it, of the first n sources.
 class Covariance {
  public:
   explicit Covariance(std::size_t n) : n_(n) {
@@ -25,7 +25,7 @@ class Covariance {
       }
     }
   }
-  void predict_over_block(const SlowNoiseStep& step) {
+  void predict_over_segment(const SlowNoiseStep& step) {
     for (std::size_t i = 0; i < n_; ++i) {
       for (std::size_t j = 0; j < n_; ++j) {
         const double P = xx_[i][j], unit = i == j ? 1.0 : 0.0;
@@ -124,20 +124,20 @@ NoiseWhitening::NoiseWhitening(const NoiseSeries& series, const SlowNoise& noise
   }
 
   Covariance covariance(n);
-  Steps through_gap(noise.correlation_time), over_block(noise.correlation_time);
-  predictions_.reserve(series.blocks.size());
+  Steps through_gap(noise.correlation_time), over_segment(noise.correlation_time);
+  predictions_.reserve(series.segments.size());
   gains_.reserve(series.response.size());
   log_variance_.reserve(series.response.size());
-  double variances = 0.0, end = series.blocks.front().begin;
+  double variances = 0.0, end = series.segments.front().begin;
 
-  for (const NoiseBlock& b : series.blocks) {
-    constexpr double kNoGap = 1e-3;  // of a block: rounding of the times
+  for (const NoiseSegment& b : series.segments) {
+    constexpr double kNoGap = 1e-3;  // of a segment: rounding of the times
     const double pause = b.begin - end, duration = b.end - b.begin;
     const SlowNoiseStep gap = pause > kNoGap * duration ? through_gap.over(pause) : SlowNoiseStep{};
-    const SlowNoiseStep& step = over_block.over(duration);
+    const SlowNoiseStep& step = over_segment.over(duration);
     end = b.end;
     covariance.predict_through_gap(gap);
-    covariance.predict_over_block(step);
+    covariance.predict_over_segment(step);
     predictions_.push_back({gap.keep, step.keep, step.mean});
 
     for (std::size_t i = b.first_row; i < b.first_row + b.rows; ++i) {
@@ -164,8 +164,8 @@ void NoiseWhitening::apply(RowMatrix& rows) const {
     m[s].assign(columns, 0.0);
   }
 
-  for (std::size_t k = 0; k < series_.blocks.size(); ++k) {
-    const NoiseBlock& b = series_.blocks[k];
+  for (std::size_t k = 0; k < series_.segments.size(); ++k) {
+    const NoiseSegment& b = series_.segments[k];
     const Prediction& p = predictions_[k];
     for (std::size_t s = 0; s < n; ++s) {
       const double to_m = p.mean * p.through_gap, to_x = p.keep * p.through_gap;

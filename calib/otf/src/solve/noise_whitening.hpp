@@ -50,7 +50,7 @@ class NoiseWhitening {
   };
 
   const NoiseSeries& series_;
-  std::vector<Prediction> predictions_;  ///< by block
+  std::vector<Prediction> predictions_;  ///< by segment
   std::vector<Gain> gains_;              ///< by row
   std::vector<double> log_variance_;
   double mean_variance_ = 1.0;

@@ -29,7 +29,7 @@ std::vector<Difference> differences(const Observations& o, std::span<const doubl
       continue;
     }
     auto& last = before[row.component];
-    if (last && o.rows[*last].leg == row.leg && o.rows[*last].block + 1 == row.block) {
+    if (last && o.rows[*last].leg == row.leg && o.rows[*last].segment + 1 == row.segment) {
       const Vector3 beam_m = row.axis_position_m + o.target_offset_m - tracker_m;
       all.push_back({residual_m[i] - residual_m[*last], row.direction, beam_m.normalized()});
     }

@@ -70,7 +70,7 @@ Result<Whitened> adjust_whitened(const Observations& o, const WhitenedRows& rows
                                  const Options& options) {
   ABBE_TRY(check_stopped(options.stopped));
 
-  const Result<Adjustment> a = adjust(information_of(o, rows), o, options.gauge_weight);
+  const Result<Adjustment> a = adjust(information_of(o, rows), o, options.datum_weight);
   ABBE_TRY(a);
 
   const std::size_t dof = o.rows.size() - a->rank;

@@ -64,7 +64,8 @@ class Products {
 constexpr double kCorrelationTimes = 4.0;
 
 double time_of(const Observations& o, const Observation& row) {
-  return row.block < o.block_s.size() ? o.block_s[row.block] : static_cast<double>(row.block);
+  return row.segment < o.segment_s.size() ? o.segment_s[row.segment]
+                                          : static_cast<double>(row.segment);
 }
 
 /// Consecutive legs within half of the time after which slow noise is independent count as one:

@@ -3,7 +3,7 @@
 
 #include "abbe/calib/internal/estimation/sparse_information.hpp"
 #include "abbe/calib/otf/solve/solve.hpp"
-#include "solve/gauge_of.hpp"
+#include "solve/datum_of.hpp"
 #include "solve/priors.hpp"
 
 namespace abbe::calib::otf {
@@ -48,8 +48,8 @@ RowInformation information_of(const Observations& o,
   return information;
 }
 
-estimation::Datum gauge_of(const Observations& o) {
-  return estimation::Datum(gauge_conditions(Gauge::G2, o.basis, o.unknowns()));
+estimation::Datum datum_of(const Observations& o) {
+  return estimation::Datum(datum_conditions(ModelDatum::G2, o.basis, o.unknowns()));
 }
 
 std::size_t determined_by(const estimation::Information& data, const Eigen::MatrixXd& Q) {
@@ -57,13 +57,13 @@ std::size_t determined_by(const estimation::Information& data, const Eigen::Matr
   return static_cast<std::size_t>(std::lround((R * Q).cwiseProduct(R).sum()));
 }
 
-Result<Adjustment> adjust(const RowInformation& rows, const Observations& o, double gauge_weight) {
+Result<Adjustment> adjust(const RowInformation& rows, const Observations& o, double datum_weight) {
   std::optional<estimation::Information> noise;
   if (rows.noise) {
     noise = with_priors(*rows.noise, o);
   }
-  Result<Adjustment> a = gauge_of(o).solve(with_priors(rows.data, o),
-                                           {.weight = gauge_weight,
+  Result<Adjustment> a = datum_of(o).solve(with_priors(rows.data, o),
+                                           {.weight = datum_weight,
                                             .noise = noise ? &*noise : nullptr,
                                             .label = [&](std::size_t i) { return o.label(i); }});
   if (a && o.smoothness) {

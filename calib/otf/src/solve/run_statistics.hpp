@@ -16,7 +16,7 @@ namespace abbe::calib::otf {
 /// increase with them. Residuals smaller than the stated noise do not reduce the uncertainty.
 [[nodiscard]] double variance_factor(const ResidualNoise&, std::size_t degrees_of_freedom);
 
-/// Mean distance of the times of consecutive blocks; 1 for blocks without times.
-[[nodiscard]] double block_distance(const Observations&);
+/// Mean distance of the times of consecutive segments; 1 for segments without times.
+[[nodiscard]] double segment_distance(const Observations&);
 
 }  // namespace abbe::calib::otf

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "abbe/calib/estimation/datum.hpp"
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/calib/otf/observe/observe.hpp"
 
 namespace abbe::calib::otf {
@@ -56,10 +56,10 @@ class RunUnknowns {
   std::size_t model_ = 0, per_run_ = 0, runs_ = 0;
 };
 
-/// The conditions of gauge G2 for `unknowns` unknowns, of which the first are those of the basis.
-[[nodiscard]] inline estimation::Datum gauge_of_runs(const TableBasis& basis,
+/// The conditions of datum G2 for `unknowns` unknowns, of which the first are those of the basis.
+[[nodiscard]] inline estimation::Datum datum_of_runs(const TableBasis& basis,
                                                      std::size_t unknowns) {
-  return estimation::Datum(gauge_conditions(Gauge::G2, basis, unknowns));
+  return estimation::Datum(datum_conditions(ModelDatum::G2, basis, unknowns));
 }
 
 }  // namespace abbe::calib::otf

@@ -51,12 +51,12 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   Statistics s;
   s.samples = o.samples;
   s.lost_samples = o.lost_samples;
-  s.blocks = o.blocks;
-  s.blocks_used = o.blocks_used;
+  s.segments = o.segments;
+  s.segments_used = o.segments_used;
   s.observations = o.rows.size();
   s.unknowns = o.unknowns();
   s.rank = a.rank;
-  s.gauge_conditions = a.datum_defect;
+  s.datum_conditions = a.datum_defect;
   s.degrees_of_freedom = s.observations - s.rank;
   s.condition = a.condition;
   s.chi2 = chi2(o, residuals.after_m);
@@ -74,11 +74,11 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   return s;
 }
 
-double block_distance(const Observations& o) {
-  if (o.block_s.size() < 2) {
+double segment_distance(const Observations& o) {
+  if (o.segment_s.size() < 2) {
     return 1.0;
   }
-  return (o.block_s.back() - o.block_s.front()) / static_cast<double>(o.block_s.size() - 1);
+  return (o.segment_s.back() - o.segment_s.front()) / static_cast<double>(o.segment_s.size() - 1);
 }
 
 namespace {
@@ -96,7 +96,7 @@ Result<void> check_enough(const Observations& o) {
 }  // namespace
 
 std::string_view stop_reason(Estimator estimator) {
-  return estimator == Estimator::Joint ? "converged" : "direct";
+  return estimator == Estimator::Simultaneous ? "converged" : "direct";
 }
 
 std::vector<double> residuals_m(const Observations& o, const Eigen::VectorXd& U) {
@@ -133,7 +133,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   report(options, Stage::Solve, 0.5);
   ABBE_TRY(check_stopped(options.stopped));
 
-  Result<Adjustment> a = adjust(rows, o, options.gauge_weight);
+  Result<Adjustment> a = adjust(rows, o, options.datum_weight);
   ABBE_TRY(a);
 
   Result<ValidityVolume> validity = ValidityVolume::hull_of(o.covered_m);
@@ -176,7 +176,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
 
   // Of the noise that the residuals have, also where it is smaller than stated.
   FitOfRows fit{a->U, residuals.after_m, figures.chi2_per_dof * figures.correlation * a->covariance,
-                figures.correlation * block_distance(o), two_axes};
+                figures.correlation * segment_distance(o), two_axes};
   a->covariance *= figures.variance_factor;
   a->covariance += root_of_offset * root_of_offset.transpose();
   if (drift) {

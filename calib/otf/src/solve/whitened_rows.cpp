@@ -17,7 +17,7 @@ SlowNoise in_units_of_white(const TrackerNoise& noise) {
 /// Means over the rows, by component.
 std::array<double, 3> correlations(const Observations& o, const NoiseSeries& series,
                                    const SlowNoise& noise) {
-  const SlowNoiseStep step = slow_noise_step(series.block_duration(), noise.correlation_time);
+  const SlowNoiseStep step = slow_noise_step(series.segment_duration(), noise.correlation_time);
   const auto product = [&](std::size_t i, std::size_t j) {
     double sum = 0.0;
     for (std::size_t s = 0; s < series.sources; ++s) {
@@ -47,10 +47,10 @@ std::array<double, 3> correlations(const Observations& o, const NoiseSeries& ser
 
 std::optional<std::size_t> row_before(const Observations& o, std::size_t i) {
   const Observation& row = o.rows[i];
-  while (i > 0 && o.rows[i - 1].leg == row.leg && o.rows[i - 1].block + 1 >= row.block) {
+  while (i > 0 && o.rows[i - 1].leg == row.leg && o.rows[i - 1].segment + 1 >= row.segment) {
     --i;
     if (o.rows[i].component == row.component) {
-      return o.rows[i].block + 1 == row.block ? std::optional(i) : std::nullopt;
+      return o.rows[i].segment + 1 == row.segment ? std::optional(i) : std::nullopt;
     }
   }
   return std::nullopt;

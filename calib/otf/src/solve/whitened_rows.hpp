@@ -43,8 +43,8 @@ class WhitenedRows {
   std::array<double, 3> lag_1_{};
 };
 
-/// The row of the same component in the block directly before that of row i, if this block is used
-/// and on the same leg.
+/// The row of the same component in the segment directly before that of row i, if this segment is
+/// used and on the same leg.
 [[nodiscard]] std::optional<std::size_t> row_before(const Observations&, std::size_t i);
 
 }  // namespace abbe::calib::otf

@@ -56,7 +56,7 @@ double variance_of_mean(const Standstill& s, Eigen::Index k, double sigma2, doub
   return variance + (significant ? creep2 / kUniform : 0.0);
 }
 
-/// Alignment of the assigned standstills: leg and block are position and standstill.
+/// Alignment of the assigned standstills: leg and segment are position and standstill.
 Alignment alignment_of(const StandstillAssignment& a, const Standstills& all, const Path& path) {
   Alignment alignment{.T_machine_tracker = a.T_machine_tracker,
                       .rough_T_machine_tracker = a.rough_T_machine_tracker};
@@ -105,7 +105,7 @@ void append_position(Observations& o, std::size_t position, std::size_t standsti
   const Vector3& nominal = o.vertices_m[position];
   const RigidTransform& T = o.alignment.T_machine_tracker;
   const PointOnPath point{.leg = position,
-                          .block = standstill,
+                          .segment = standstill,
                           .deviation_m = T * s.mean_tracker_m - o.target_offset_m - nominal,
                           .axis_position_m = nominal,
                           .frame = {},
@@ -157,8 +157,8 @@ Result<Observations> observe_standstills(const Standstills& all, const Machine& 
   o.travel = travel_along(path.vertices_m, o.mode);
   o.samples = all.samples;
   o.lost_samples = all.lost_samples;
-  o.blocks = all.found.size();
-  o.block_s = times_of(all).of_block_s;
+  o.segments = all.found.size();
+  o.segment_s = times_of(all).of_segment_s;
   o.notes = notes_of(*a, all.found, path);
   note_noise(o.notes, all, noise);
   const std::vector<Vector3> u_m = u_of_means_m(all, noise, options.standstill.u_repeatability_m);
@@ -169,7 +169,7 @@ Result<Observations> observe_standstills(const Standstills& all, const Machine& 
     if (const auto i = a->standstill_of[j]) {
       append_position(o, j, *i, all.found[*i], u_m[*i]);
       o.covered_m.push_back(path.vertices_m[j]);
-      ++o.blocks_used;
+      ++o.segments_used;
     }
   }
 

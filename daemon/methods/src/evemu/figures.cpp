@@ -42,7 +42,7 @@ Table rotation_table(const evemu::Solution& solution) {
                 fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * rotation.removed_rad.x(),
                             kUradPerRad * rotation.removed_rad.y(),
                             kUradPerRad * rotation.removed_rad.z())}}};
-  if (const auto& reference = rotation.reference)
+  if (const auto& reference = rotation.rotation_reference)
     table.rows.push_back(
         {"rotation reference",
          fmt::format("{} points; {} more points are outside the volume of the balls and were not "

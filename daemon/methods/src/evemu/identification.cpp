@@ -126,9 +126,9 @@ Result<evemu::Observations> evemu_observations(const EvemuRun& run, const Config
 
 Result<EvemuCandidate> identify_with_array(EvemuTask task, const calib::VolumetricModel* active) {
   auto solution = evemu::solve(task.observations, task.judging.solve);
-  if (solution && task.reference)
-    solution = evemu::with_rotation_reference(std::move(*solution),
-                                              {task.reference->points, task.reference->sigma_m});
+  if (solution && task.rotation_reference)
+    solution = evemu::with_rotation_reference(
+        std::move(*solution), {task.rotation_reference->points, task.rotation_reference->sigma_m});
   if (!solution) return tl::unexpected(error_of(solution.error()));
 
   const auto& stopped = task.judging.watch.stopped;

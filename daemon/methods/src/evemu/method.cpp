@@ -105,7 +105,8 @@ json EvemuMethod::to_json(const Request& request) {
            {"points_per_ball", request.plan.points_per_ball},
            {"points_per_block", request.plan.points_per_block},
            {"sources", sources}};
-  if (request.reference) out["rotation_reference"] = reference_json(*request.reference);
+  if (request.rotation_reference)
+    out["rotation_reference"] = reference_json(*request.rotation_reference);
   return out;
 }
 
@@ -118,7 +119,7 @@ EvemuMethod::Request EvemuMethod::request_from(const json& object, const Config*
   for (const json& s : object.at("sources"))
     request.sources.push_back({s.at("name").get<std::string>(), s.at("sha256").get<std::string>()});
   if (object.contains("rotation_reference"))
-    request.reference = reference_of(object.at("rotation_reference"));
+    request.rotation_reference = reference_of(object.at("rotation_reference"));
   return request;
 }
 
@@ -139,7 +140,8 @@ Result<EvemuMethod::Candidate> EvemuMethod::identify(const Run& run, const Confi
                                                      const IdentificationWatch& watch) {
   auto observations = evemu_observations(run, config);
   ABBE_TRY(observations);
-  EvemuTask task{*std::move(observations), evemu_judge_options(config), run.asked.reference};
+  EvemuTask task{*std::move(observations), evemu_judge_options(config),
+                 run.asked.rotation_reference};
   task.judging.watch.stopped = watch.stopped;
   return identify_with_array(std::move(task), active);
 }

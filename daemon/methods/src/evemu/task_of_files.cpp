@@ -13,7 +13,7 @@ nlohmann::json evemu_task(const CalibratorFile& calibrator, const BallErrorsFile
   request.calibrator = calibrator.calibrator;
   request.sources = {calibrator.source};
   if (reference != nullptr) {
-    request.reference = {reference->errors, u_reference_m};
+    request.rotation_reference = {reference->errors, u_reference_m};
     request.sources.push_back(reference->source);
   }
 

@@ -42,26 +42,26 @@ RunPoint run_point(const Snapshot& s) {
 }  // namespace
 
 void RunPoints::push_back(const RunPoint& point) {
-  if (size_ == blocks_.size() * kPointsInBlock)
-    blocks_.push_back(std::make_shared<RunPoint[]>(kPointsInBlock));
-  blocks_[size_ / kPointsInBlock][size_ % kPointsInBlock] = point;
+  if (size_ == chunks_.size() * kPointsInChunk)
+    chunks_.push_back(std::make_shared<RunPoint[]>(kPointsInChunk));
+  chunks_[size_ / kPointsInChunk][size_ % kPointsInChunk] = point;
   ++size_;
 }
 
 std::vector<RunPoint> RunPoints::joined() const {
   std::vector<RunPoint> all;
   all.reserve(size_);
-  for (std::size_t i = 0; i < full_blocks(); ++i)
-    all.insert(all.end(), blocks_[i].get(), blocks_[i].get() + kPointsInBlock);
+  for (std::size_t i = 0; i < full_chunks(); ++i)
+    all.insert(all.end(), chunks_[i].get(), chunks_[i].get() + kPointsInChunk);
   const std::vector<RunPoint> last = tail();
   all.insert(all.end(), last.begin(), last.end());
   return all;
 }
 
 std::vector<RunPoint> RunPoints::tail() const {
-  const std::size_t count = size_ % kPointsInBlock;
+  const std::size_t count = size_ % kPointsInChunk;
   if (count == 0) return {};
-  const RunPoint* first = blocks_[full_blocks()].get();
+  const RunPoint* first = chunks_[full_chunks()].get();
   return {first, first + count};
 }
 
@@ -107,9 +107,9 @@ void OtfAcquisition::begin_leg(std::size_t leg, const RunPoint& point, const Vec
 }
 
 RunNews OtfAcquisition::take_news() {
-  RunNews news{.blocks = {}, .tail = points_.tail(), .legs = {}, .environment = environment()};
-  for (; blocks_taken_ < points_.full_blocks(); ++blocks_taken_)
-    news.blocks.push_back(points_.full_block(blocks_taken_));
+  RunNews news{.chunks = {}, .tail = points_.tail(), .legs = {}, .environment = environment()};
+  for (; chunks_taken_ < points_.full_chunks(); ++chunks_taken_)
+    news.chunks.push_back(points_.full_chunk(chunks_taken_));
   news.legs.assign(legs_.begin(), legs_.end());
   legs_.clear();
   return news;

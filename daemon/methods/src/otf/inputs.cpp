@@ -7,8 +7,8 @@
 #include <cmath>
 #include <string>
 
-#include "abbe/calib/otf/observe/blocks.hpp"
 #include "abbe/calib/otf/observe/orientation.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "abbe/calib/otf/plan/plan_observable.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/calib/otf/solve/backlash.hpp"
@@ -105,7 +105,7 @@ calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> 
   options.backlash = calib_of(config.otf.backlash);
   options.nests = nest_options(config.otf);
   options.smoothness = smoothness_options(config.otf);
-  options.block_samples = calib::otf::suitable_block_samples(points);
+  options.segment_samples = calib::otf::suitable_segment_samples(points);
   options.held_out_folds =
       static_cast<std::size_t>(std::lround(1.0 / config.gate.holdout_fraction));
   options.orientation = orientation_evidence(config.machine, config.gate);

@@ -65,7 +65,7 @@ OtfLiveTables::OtfLiveTables(const Config& config, calib::otf::Machine machine,
       estimate_(std::move(estimate)) {}
 
 void OtfLiveTables::take(RunNews&& news) {
-  std::ranges::move(news.blocks, std::back_inserter(blocks_));
+  std::ranges::move(news.chunks, std::back_inserter(chunks_));
   tail_ = std::move(news.tail);
   environment_ = news.environment;
   for (const LegBegun& leg : news.legs) {
@@ -76,9 +76,9 @@ void OtfLiveTables::take(RunNews&& news) {
 }
 
 const RunPoint& OtfLiveTables::point(std::size_t i) const {
-  const std::size_t block = i / RunPoints::kPointsInBlock;
-  return block < blocks_.size() ? blocks_[block][i % RunPoints::kPointsInBlock]
-                                : tail_[i - blocks_.size() * RunPoints::kPointsInBlock];
+  const std::size_t chunk = i / RunPoints::kPointsInChunk;
+  return chunk < chunks_.size() ? chunks_[chunk][i % RunPoints::kPointsInChunk]
+                                : tail_[i - chunks_.size() * RunPoints::kPointsInChunk];
 }
 
 void OtfLiveTables::add(const RunPoint& point) {
@@ -90,7 +90,7 @@ void OtfLiveTables::add(const RunPoint& point) {
 /// The vertices of a leg are corrected by the mean temperature of the scales up to the time of its
 /// accumulation, those of the identification by the mean of the run.
 void OtfLiveTables::add_points() {
-  const std::size_t end = blocks_.size() * RunPoints::kPointsInBlock + tail_.size();
+  const std::size_t end = chunks_.size() * RunPoints::kPointsInChunk + tail_.size();
   for (; next_point_ < end; ++next_point_) {
     while (next_leg_ < legs_.size() && legs_[next_leg_].first_point <= next_point_) {
       const LegBegun& leg = legs_[next_leg_++];

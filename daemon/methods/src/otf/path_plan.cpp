@@ -56,7 +56,7 @@ nlohmann::json prediction_json(const calib::otf::Prediction& p) {
                         {"observations", p.observations},
                         {"unknowns", p.unknowns},
                         {"rank", p.rank},
-                        {"gauge_conditions", p.datum_defect},
+                        {"datum_conditions", p.datum_defect},
                         {"condition", p.condition},
                         {"not_observable", p.left_out},
                         {"tables", uncertainties_json(p.tables)}};

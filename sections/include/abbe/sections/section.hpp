@@ -79,10 +79,11 @@ class Section {
   bool get_integer(std::string_view key, Integer& out, std::int64_t min, std::int64_t max,
                    Need need = Need::Optional);
   /// Reads a text that must be one of the first elements of `words`; sets `out` to the enumerator
-  /// beside it.
+  /// beside it. `earlier`: words of earlier versions, which are read, too; no fault names them.
   template <class Enum>
   bool get_word(std::string_view key, Enum& out,
-                std::vector<std::pair<std::string_view, Enum>> words, Need need = Need::Optional);
+                std::vector<std::pair<std::string_view, Enum>> words, Need need = Need::Optional,
+                const std::vector<std::pair<std::string_view, Enum>>& earlier = {});
   /// A path; a relative path is relative to `base`.
   bool get(std::string_view key, std::filesystem::path& out, const std::filesystem::path& base);
 
@@ -102,8 +103,9 @@ class Section {
   void check_characters(std::string_view key, std::string_view value);
   bool take_integer(std::string_view key, std::int64_t& out, std::int64_t min, std::int64_t max,
                     Need need);
+  /// `current`: the first ones of `words`, which a fault names.
   bool take_word(std::string_view key, std::size_t& out, const std::vector<std::string_view>& words,
-                 Need need);
+                 std::size_t current, Need need);
 
   const toml::table* table_;
   std::string path_;
@@ -124,12 +126,15 @@ bool Section::get_integer(std::string_view key, Integer& out, std::int64_t min, 
 
 template <class Enum>
 bool Section::get_word(std::string_view key, Enum& out,
-                       std::vector<std::pair<std::string_view, Enum>> words, Need need) {
+                       std::vector<std::pair<std::string_view, Enum>> words, Need need,
+                       const std::vector<std::pair<std::string_view, Enum>>& earlier) {
+  const std::size_t current = words.size();
+  words.insert(words.end(), earlier.begin(), earlier.end());
   std::vector<std::string_view> names;
   names.reserve(words.size());
   for (const auto& [name, value] : words) names.push_back(name);
   std::size_t index = 0;
-  if (!take_word(key, index, names, need)) return false;
+  if (!take_word(key, index, names, current, need)) return false;
   out = words[index].second;
   return true;
 }

@@ -61,7 +61,7 @@ struct MotionSource {
 [[nodiscard]] std::optional<MotionSource> motion_source(const Config& config);
 
 /// The card whose counters read the axes. When the card is set up its counters start at 0, so the
-/// axis readings have an unknown offset until the axes are referenced; see Datum.
+/// axis readings have an unknown offset until the axes are referenced; see AxisZeros.
 struct CountedAxes {
   std::string_view key;       ///< of its table
   const UsbCardConfig& card;  ///< in the Config

@@ -198,7 +198,7 @@ struct GateConfig {
 };
 
 enum class OtfMode { OnTheFly, Standstill };
-enum class OtfEstimator { TwoStep, Joint };
+enum class OtfEstimator { TwoStep, Simultaneous };
 /// Differences between both directions of travel: none, one per table, one per node.
 enum class OtfBacklash { None, PerTable, PerNode };
 
@@ -211,9 +211,9 @@ struct NestConfig {
 
 /// [otf]: calibration with a laser tracker along a path.
 struct OtfConfig {
-  OtfMode mode = OtfMode::OnTheFly;              ///< unless a request names another one
-  double u_repeatability_m = 0.5e-6;             ///< of one standstill, per component
-  OtfEstimator estimator = OtfEstimator::Joint;  ///< of on-the-fly mode
+  OtfMode mode = OtfMode::OnTheFly;                     ///< unless a request names another one
+  double u_repeatability_m = 0.5e-6;                    ///< of one standstill, per component
+  OtfEstimator estimator = OtfEstimator::Simultaneous;  ///< of on-the-fly mode
   OtfBacklash backlash = OtfBacklash::None;
   std::vector<NestConfig> nests{};
   double u_nest_repeatability_m = 3e-6;  ///< of one visit of a nest, per coordinate

@@ -17,7 +17,7 @@ struct FieldComparison {
   std::size_t points = 0;    ///< number of compared points
   std::size_t outside = 0;   ///< points without a value in the field
   Lengths before;            ///< |V_known|
-  Lengths after;             ///< |V_known - V_field|, gauges unchanged
+  Lengths after;             ///< |V_known - V_field|, datums unchanged
   Lengths after_rigid_free;  ///< after removal of the best-fit rigid motion T + r x p
 };
 /// Compares `known_V_m` at `positions_m` with the field. DataInsufficient for fewer than 3 points

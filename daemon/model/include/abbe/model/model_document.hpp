@@ -130,7 +130,7 @@ struct ModelDocument {
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 
-/// SHA-256 in hex over the content of the model: method, chain, basis, nodes, gauge, tools,
+/// SHA-256 in hex over the content of the model: method, chain, basis, nodes, datum, tools,
 /// parameters, covariance, validity, the corrected thermal expansion of the ball array, the
 /// differences between the directions of travel, the misfit, and the place of the tracker. Dates,
 /// inputs and statistics are not included, so that the live model and its replay have equal hashes.

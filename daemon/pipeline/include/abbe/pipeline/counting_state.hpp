@@ -1,10 +1,10 @@
 #pragma once
 /// State of the counter card that survives a restart of the daemon: DATA_DIR/counting-state.json
-/// contains the counts of the card that counts the axes, and the datum of each axis (its reading at
-/// count 0). The datum refers to the counters, which continue without the daemon. It stays valid if
+/// contains the counts of the card that counts the axes, and the zero of each axis (its reading at
+/// count 0). The zero refers to the counters, which continue without the daemon. It stays valid if
 /// the card and its set-up are the same, the computer was not rebooted, and the clock count of the
 /// card shows that the counters have continued (drivers::CounterCardReceiverOptions::resume_from).
-/// The file may be seconds old without harm: a datum changes only when an axis is referenced, and
+/// The file may be seconds old without harm: a zero changes only when an axis is referenced, and
 /// the file is then written within a second. Not for the RT path.
 
 #include <filesystem>
@@ -16,16 +16,16 @@
 #include "abbe/base/error.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/messages/recording_info.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/pipeline/counting_progress.hpp"
-#include "abbe/pipeline/datum.hpp"
 
 namespace abbe::daemon {
 
-/// Counts and datums at the same time. `datum` applies to the counts of `progress`; an axis without
-/// an element in `datum` is not referenced.
+/// Counts and zeros at the same time. `zero` applies to the counts of `progress`; an axis without
+/// an element in `zero` is not referenced.
 struct Counting {
   CountingProgress progress;
-  std::vector<FoundDatum> datum;
+  std::vector<FoundZero> zero;
 };
 
 struct CountingState {

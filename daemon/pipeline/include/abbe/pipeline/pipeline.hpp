@@ -2,7 +2,7 @@
 /// Processing steps for the samples of one cycle, the same live (in the hub) and in a replay:
 ///
 ///   1. observers see the batch as the devices delivered it (search for reference marks)
-///   2. every axis reading gets its datum, the reading at count 0; an axis that is not
+///   2. every axis reading gets its zero, the reading at count 0; an axis that is not
 ///      referenced is marked missing
 ///   3. observers see the samples (live view, publisher, recorder)
 ///   4. samples are assembled to snapshots: axes are interpolated to the instant of each tracker
@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "abbe/pipeline/assembler.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/pipeline/batch.hpp"
-#include "abbe/pipeline/datum.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -31,7 +31,7 @@ class PipelineObserver {
   PipelineObserver() = default;
   virtual ~PipelineObserver() = default;
 
-  /// Step 1. If the observer finds a datum, it already applies to the samples of this batch.
+  /// Step 1. If the observer finds a zero, it already applies to the samples of this batch.
   virtual void on_delivered(const Batch&) {}
   /// Step 3. Called in every cycle, also with an empty batch.
   virtual void on_samples(const Batch&) {}
@@ -47,8 +47,8 @@ class PipelineObserver {
 
 class Pipeline {
  public:
-  /// `datum`: null if the readings in the batches have their datum already, as in a recording.
-  Pipeline(AssemblerOptions options, Datum* datum);
+  /// `zero`: null if the readings in the batches have their zero already, as in a recording.
+  Pipeline(AssemblerOptions options, AxisZeros* zeros);
 
   /// The observer must outlive the pipeline.
   void add(PipelineObserver& observer) { observers_.push_back(&observer); }
@@ -68,7 +68,7 @@ class Pipeline {
  private:
   void report_snapshots(protocol::HostTime taken);
 
-  Datum* datum_;
+  AxisZeros* zeros_;
   Assembler assembler_;
   std::vector<PipelineObserver*> observers_;
   std::vector<protocol::Snapshot> snapshots_;  // reused: allocates only at first

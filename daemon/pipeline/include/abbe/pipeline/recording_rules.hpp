@@ -7,15 +7,15 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/pipeline/batch.hpp"
-#include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/sensor_options.hpp"
 
 namespace abbe::daemon {
 
 /// Key and version of each rule, as in RecordingInfo::versions.
 [[nodiscard]] inline std::vector<std::pair<std::string, std::string>> recording_rules() {
-  return {{kAxisSamplesRule, "1"}, {kDatumRule, "2"}, {kRotaryTravelRule, "1"}, {kSensorRule, "1"}};
+  return {{kAxisSamplesRule, "1"}, {kZeroRule, "2"}, {kRotaryTravelRule, "1"}, {kSensorRule, "1"}};
 }
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// Finds the datum of each axis from its distance-coded marks, with two cards: one counts the axes
+/// Finds the zero of each axis from its distance-coded marks, with two cards: one counts the axes
 /// live, the other latches its counts of the same axes at their marks. Takes the samples of both
 /// cards while the operator drives the axes over a few marks; the search ends separately for each
 /// axis. Reads no clock and starts no thread, so that a replay gives the results of the live run.
@@ -49,7 +49,7 @@ struct AxisReference {
   /// reading (m or rad) at count 0 of the live counter, relative to the zero mark of the scale
   double offset = 0.0;
   double u_offset = 0.0;
-  std::string reason;  ///< why the latest mark gave no datum, or why the search failed
+  std::string reason;  ///< why the latest mark gave no zero, or why the search failed
 };
 
 class ReferenceSession {
@@ -68,7 +68,7 @@ class ReferenceSession {
     ReferenceAxis options;
     drivers::MarkTraverse traverse;
     drivers::CounterAlignment alignment;
-    std::optional<drivers::MarkDatum> datum;
+    std::optional<drivers::MarkZero> zero;
     AxisReference result;
     protocol::HostTime followed{};  ///< the traverse has the axis positions up to this time
   };
@@ -92,9 +92,9 @@ class ReferenceSession {
 /// Reading at count 0 of an axis in state Found, m or rad.
 [[nodiscard]] double reading_at_zero(const AxisMarks& marks, const AxisReference& found);
 
-/// Request to set the datum of axes without marks: the current position of each axis is defined as
+/// Request to set the zero of axes without marks: the current position of each axis is defined as
 /// the one at which the axis reads its configured offset.
-struct SetDatumHere {
+struct SetZeroHere {
   static constexpr double kByEye = 100e-6;  ///< m or rad; for a position set by eye
 
   std::vector<std::string> axes;  ///< empty: all axes without marks

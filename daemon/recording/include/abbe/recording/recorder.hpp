@@ -28,8 +28,8 @@
 /// Every further file can be replayed without the earlier ones: its first messages repeat the
 /// EnvironmentSamples that its instants need, at least the last one of each device (log_time and
 /// publish_time: when the file began, content: when it was measured). Its attachments are the state
-/// of the checks of the sensors before these, the valid datums and the list of axes that are not
-/// referenced (DatumState).
+/// of the checks of the sensors before these, the valid zeros and the list of axes that are not
+/// referenced (ZeroState).
 ///
 /// Used by one thread. Not real-time: it allocates and makes blocking system calls.
 

@@ -56,18 +56,18 @@ struct ReplayedCalibration {
   ObservedTimes observed{};   ///< host times of the recording
 };
 
-/// The datum of one axis: the one found live, and the one that the replay found from the reference
+/// The zero of one axis: the one found live, and the one that the replay found from the reference
 /// marks in the raw bytes of both cards.
-struct ReplayedDatum {
+struct ReplayedZero {
   std::string axis;
   double live = 0.0;  ///< reading at count 0, m or rad, from the attachment of the recording
-  /// the datum that the replay found; nullopt: not found from the recorded marks
+  /// the zero that the replay found; nullopt: not found from the recorded marks
   std::optional<double> again;
 };
 
 struct ReplayReport {
   std::vector<ReplayedCalibration> calibrations;
-  std::vector<ReplayedDatum> datums;        ///< from raw bytes only
+  std::vector<ReplayedZero> zeros;          ///< from raw bytes only
   std::vector<std::string> live_model_ids;  ///< from the calibration events in the recording
   std::uint64_t snapshots = 0;
   std::uint64_t samples = 0;            ///< of all devices, recorded or decoded from bytes
@@ -87,7 +87,7 @@ void judge_recording(const RecordingReader& recording, calib::Verdict& verdict);
 
 /// Replays the recording. `config` is the configuration of the live run
 /// (RecordingInfo::configuration). BadInput if an attachment that the replay needs cannot be read:
-/// a calibration request, a search for reference marks, or a datum. DataInsufficient if
+/// a calibration request, a search for reference marks, or a zero. DataInsufficient if
 /// ReplayOptions::stopped ended it. judge_recording() is already applied to the verdicts in the
 /// result.
 [[nodiscard]] Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,

@@ -13,7 +13,7 @@ namespace abbe::daemon {
 
 enum class Role {
   Look,    ///< reads state, or stops a motion
-  Change,  ///< changes the active model or the datum of an axis, or may lead to such a change
+  Change,  ///< changes the active model or the zero of an axis, or may lead to such a change
   Move,    ///< moves a machine or a tracker, or keeps it moving
 };
 

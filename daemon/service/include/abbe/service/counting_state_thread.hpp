@@ -1,6 +1,6 @@
 #pragma once
 /// An ordinary thread that writes DATA_DIR/counting-state.json. It reads the state once a second
-/// and writes the file when the datum of an axis changed, else every 5 s, and at the end. A disk
+/// and writes the file when the zero of an axis changed, else every 5 s, and at the end. A disk
 /// that does not answer blocks only this thread, and not the end of the daemon: a thread that still
 /// waits for the disk after kEndTimeout is left running, see background_tasks_running().
 

@@ -1,6 +1,6 @@
 #pragma once
 /// `abbe reference` in the daemon: runs a ReferenceSession with the live samples and the reference
-/// marks of the second card, and keeps the datum of every axis. The hub's thread only; no call
+/// marks of the second card, and keeps the zero of every axis. The hub's thread only; no call
 /// waits.
 
 #include <chrono>
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "abbe/config/config.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/pipeline/counting_state.hpp"
-#include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/pipeline.hpp"
 #include "abbe/pipeline/reference_session.hpp"
 #include "abbe/recording/recorder_thread.hpp"
@@ -27,32 +27,32 @@ class ReferenceService : public PipelineObserver {
     bool known = false;            ///< the axis is referenced now
   };
 
-  /// `recorder` may be null. `left`: counters and datums at the end of the previous run. They are
+  /// `recorder` may be null. `left`: counters and zeros at the end of the previous run. They are
   /// used if the first sample shows that the counters have continued since, else discarded.
   ReferenceService(const Config& config, RecorderThread* recorder,
                    std::optional<Counting> left = {});
 
   /// Starts a search for the reference marks. Refused if no card latches at marks, and while a
-  /// search is running. A referenced axis keeps its datum until the new one is found.
+  /// search is running. A referenced axis keeps its zero until the new one is found.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
-  /// Sets the datum of axes without marks such that their present readings become their configured
+  /// Sets the zero of axes without marks such that their present readings become their configured
   /// offsets. Usage for an axis that has marks or is not counted, and for an uncertainty that is
   /// not positive. Refused while a calibration takes readings, without a recent sample, and unless
   /// the axes have stood for half a second.
-  [[nodiscard]] Result<void> set_datum_here(const SetDatumHere& here);
+  [[nodiscard]] Result<void> set_zero_here(const SetZeroHere& here);
   /// While a search is running, passes the samples of the batch to it.
   void on_delivered(const Batch& batch) override;
-  /// The datum of every axis, for the pipeline.
-  [[nodiscard]] Datum& datum() noexcept { return datum_; }
+  /// The zero of every axis, for the pipeline.
+  [[nodiscard]] AxisZeros& zeros() noexcept { return zeros_; }
   /// Takes the latest state of the card's counters, as the devices report it. Call it after
   /// on_delivered().
   void take(const std::optional<CountingProgress>& progress);
 
-  /// State of the counters and datums, to be kept for the next run of abbed. nullopt after a
+  /// State of the counters and zeros, to be kept for the next run of abbed. nullopt after a
   /// restart of the counters until the card has reported their state.
   [[nodiscard]] std::optional<Counting> counting() const;
-  /// Names of the axes whose datum was taken over from the previous run.
+  /// Names of the axes whose zero was taken over from the previous run.
   [[nodiscard]] const std::vector<std::string>& carried_on() const noexcept { return carried_on_; }
   [[nodiscard]] bool configured() const noexcept { return marks_ != nullptr; }
   [[nodiscard]] bool running() const noexcept { return running_; }
@@ -64,11 +64,11 @@ class ReferenceService : public PipelineObserver {
 
  private:
   void look_for_marks(const Batch& batch);
-  void use_datum(std::size_t axis);
-  void use_datum(const FoundDatum& datum);
+  void use_zero(std::size_t axis);
+  void use_zero(const FoundZero& zero);
   [[nodiscard]] std::vector<std::string> without_marks() const;
   void watch_standing(const protocol::AxisSample& sample);
-  void use_datum_left(const protocol::AxisSample& first);
+  void use_zeros_left(const protocol::AxisSample& first);
   [[nodiscard]] Result<void> check_standing(std::size_t axis) const;
   [[nodiscard]] double reading_at_zero(std::size_t axis) const;
 
@@ -76,9 +76,9 @@ class ReferenceService : public PipelineObserver {
   std::optional<CountedAxes> counted_;
   const ReferenceMarks* marks_;
   RecorderThread* recorder_;
-  Datum datum_;
+  AxisZeros zeros_;
   std::optional<ReferenceSession> session_;  ///< the latest search
-  std::vector<bool> datum_used_;
+  std::vector<bool> zero_used_;
   bool running_ = false;
   struct Standing {
     std::int64_t count = 0;

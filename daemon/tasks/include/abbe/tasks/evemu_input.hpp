@@ -20,7 +20,7 @@ namespace abbe::daemon {
 
 /// The options that name the data. A file that is not given is an empty name.
 struct EvemuInputArguments {
-  std::string machine, touches, calibrator, errors, recording, reference;
+  std::string machine, touches, calibrator, errors, recording, rotation_reference;
   std::optional<int> order, positions;             ///< without a value: that of [evemu]
   std::optional<double> artefact_C, u_artefact_K;  ///< both or none
   double u_reference_um = 1.0;
@@ -33,7 +33,7 @@ struct EvemuInput {
   Config config;
   std::vector<InputFile> sources;
   calib::evemu::Observations observations;
-  std::optional<RotationPoints> reference;
+  std::optional<RotationPoints> rotation_reference;
   /// refuses the model if the recording is damaged
   std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};
   std::string recording_gap{};
@@ -45,7 +45,7 @@ struct EvemuInput {
 /// BadInput with file and line, or DataInsufficient if the recording has no complete run.
 [[nodiscard]] Result<EvemuInput> read_evemu_input(const EvemuInputArguments&, const Progress&);
 
-/// Adds the points of the file `reference` to the input. Does nothing if none is named.
+/// Adds the points of the file `rotation_reference` to the input. Does nothing if none is named.
 [[nodiscard]] Result<void> read_rotation_reference(const EvemuInputArguments&, EvemuInput&);
 
 /// A message if the configuration gives the artefact's temperature by a sensor, but the input is a

@@ -22,7 +22,7 @@ struct ExportArguments {
 /// The format of --to; Usage with all names if there is none.
 [[nodiscard]] Result<const FormatFacts*> format_of(const std::string& to);
 
-/// --volume "xmin,xmax,ymin,ymax,zmin,zmax" in mm; nullopt if empty.
+/// --volume-mm "xmin,xmax,ymin,ymax,zmin,zmax" in mm; nullopt if empty.
 [[nodiscard]] Result<std::optional<calib::ExportBox>> volume_of(const std::string& text);
 
 /// --axis-map "X=AX1,Y=AX2,Z=AX3": the control's names of X, Y and Z. Axes that are not given keep

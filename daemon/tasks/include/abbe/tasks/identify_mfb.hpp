@@ -16,7 +16,7 @@ namespace abbe::daemon {
 /// File names and values as a person gives them.
 struct IdentifyMfbArguments {
   std::string machine, bar, plan, points, recording, keep;
-  std::string estimator{calib::mfb::name(calib::mfb::Estimator::Joint)};
+  std::string estimator{calib::mfb::name(calib::mfb::Estimator::Simultaneous)};
   std::size_t trials = 0;  ///< 0: no Monte Carlo
   std::uint64_t seed = calib::mfb::MonteCarloOptions{}.seed;
   bool scales_corrected = false;

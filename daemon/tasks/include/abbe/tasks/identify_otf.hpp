@@ -20,7 +20,7 @@ namespace abbe::daemon {
 struct IdentifyOtfArguments {
   std::string machine, path, tracker, encoder, recording, keep, mode, tables;
   std::optional<std::string> estimator;  // without a value: that of [otf]
-  std::size_t block_samples = 0;         // 0: blocks by travel
+  std::size_t segment_samples = 0;       // 0: segments by travel
   std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
   std::string backlash;                  // empty: that of [otf]
   std::string smoothness;                // empty: that of [otf]
@@ -43,7 +43,7 @@ struct IdentifyOtfArguments {
 struct OtfOutcome {
   ModelDocument document;
   calib::Verdict verdict;
-  std::size_t blocks = 0, blocks_used = 0;
+  std::size_t segments = 0, segments_used = 0;
   std::vector<calib::otf::RangeOffset> range_offsets;  ///< one per run
   std::optional<calib::otf::Synchronisation> synchronisation{};
   std::optional<calib::otf::Smoothness> smoothness{};

@@ -12,7 +12,7 @@ namespace abbe::daemon {
 /// of the option in the message.
 [[nodiscard]] Result<calib::Vector3> parse_mm(const std::string& option, const std::string& text);
 
-/// The tool offset given by --tool (`text`), or that of the model if `text` is empty.
+/// The tool offset given by --tool-mm (`text`), or that of the model if `text` is empty.
 /// DataInsufficient if the model is not valid for this tool offset.
 [[nodiscard]] Result<calib::Vector3> tool_of(const std::string& text,
                                              const calib::VolumetricModel& model);

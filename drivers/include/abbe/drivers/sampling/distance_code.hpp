@@ -52,18 +52,18 @@ enum class MarkFault : std::uint8_t {
 [[nodiscard]] std::optional<std::int64_t> first_mark(const DistanceCode& code,
                                                      std::int64_t distance, int direction) noexcept;
 
-inline constexpr std::size_t kMarksForDatum = 4;
+inline constexpr std::size_t kMarksForZero = 4;
 
-struct MarkDatum {
+struct MarkZero {
   std::int64_t first_mark = 0;  ///< position of the first of the four, periods
   int direction = 1;            ///< of crossing
   double offset_periods = 0.0;  ///< scale position = counter + offset, mean of the four
   double spread_periods = 0.0;  ///< largest minus smallest of the four offsets
 };
 
-/// The datum that four consecutive marks give. `marks`: counts at the marks, in periods, in the
+/// The zero that four consecutive marks give. `marks`: counts at the marks, in periods, in the
 /// order of crossing; all crossed in the same direction.
-[[nodiscard]] tl::expected<MarkDatum, MarkFault> datum_of(
-    const DistanceCode& code, std::span<const double, kMarksForDatum> marks) noexcept;
+[[nodiscard]] tl::expected<MarkZero, MarkFault> zero_of(
+    const DistanceCode& code, std::span<const double, kMarksForZero> marks) noexcept;
 
 }  // namespace abbe::drivers

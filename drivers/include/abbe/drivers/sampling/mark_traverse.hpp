@@ -1,5 +1,5 @@
 #pragma once
-/// Collects the reference marks of one scale as they are crossed, until they give a datum (the
+/// Collects the reference marks of one scale as they are crossed, until they give a zero (the
 /// scale's zero relative to the counter): four consecutive marks, crossed in one direction, whose
 /// decodings agree. After a fault four new marks are needed; too many consecutive refusals mean
 /// that the scale is not the configured one. Not for the RT path, but no allocation; one thread.
@@ -27,9 +27,9 @@ class MarkTraverse {
 
   /// Takes the live count. To be called at least about once per signal period of the scale.
   void on_position(std::int64_t count) noexcept;
-  /// Takes the count at a mark that was crossed. Returns a datum, the reason why the marks give
+  /// Takes the count at a mark that was crossed. Returns a zero, the reason why the marks give
   /// none, or nullopt if more marks are needed.
-  [[nodiscard]] std::optional<tl::expected<MarkDatum, MarkFault>> on_mark(
+  [[nodiscard]] std::optional<tl::expected<MarkZero, MarkFault>> on_mark(
       std::int64_t count) noexcept;
   void reset() noexcept;
 
@@ -42,7 +42,7 @@ class MarkTraverse {
   [[nodiscard]] tl::unexpected<MarkFault> refuse(MarkFault fault) noexcept;
 
   MarkTraverseOptions options_;
-  std::array<double, kMarksForDatum> marks_{};  ///< oldest first
+  std::array<double, kMarksForZero> marks_{};  ///< oldest first
   std::size_t count_ = 0;
   std::size_t refusals_ = 0;
   bool moving_ = false;  ///< a position is known

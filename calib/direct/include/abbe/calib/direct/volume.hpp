@@ -1,7 +1,7 @@
 #pragma once
 /// Compares directly measured error motions with a model in the volume, as in [Sanders 2023]
 /// section 2.3.2: both become models of the same tables on the same nodes, in the convention of
-/// gauge G2 over the common range, and their V are compared on a grid.
+/// datum G2 over the common range, and their V are compared on a grid.
 ///
 /// - Tables: those that were measured and that the model has. The others are left out of both, and
 ///   so is a squareness that was not measured: the comparison then does not contain their effect.

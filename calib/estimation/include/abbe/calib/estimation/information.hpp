@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "abbe/calib/base/error.hpp"
-#include "abbe/calib/estimation/block.hpp"
+#include "abbe/calib/estimation/observation_group.hpp"
 #include "abbe/calib/estimation/row_batch.hpp"
 
 namespace abbe::calib::estimation {
@@ -38,9 +38,9 @@ class Information {
   void add(RowBatch&);
   /// Adds whitened rows.
   void add_rows(const Eigen::MatrixXd& A, const Eigen::VectorXd& y);
-  /// Whitens the rows and eliminates the nuisances of the block. BadInput for wrong sizes,
+  /// Whitens the rows and eliminates the nuisances of the group. BadInput for wrong sizes,
   /// DegenerateGeometry if the covariance is not positive definite.
-  [[nodiscard]] Result<void> add(const Block&);
+  [[nodiscard]] Result<void> add(const ObservationGroup&);
   /// Adds the prior U_unknown ~ N(value, u^2) as one row.
   void add_prior(std::size_t unknown, double value, double u);
   /// Adds `rows` rows without unknowns, with the sum of squares `squares` of their y.

@@ -1,8 +1,8 @@
 #pragma once
 /// Interpolation of a function f(q) between its values U at the nodes x of an axis. Linear and
 /// cubic interpolation are both linear in U and reproduce constants and straight lines exactly; the
-/// gauge conditions (gauge.hpp) rely on these two properties. In the cell from x_k to x_k+1, of
-/// length h:
+/// datum conditions (model_datum.hpp) rely on these two properties. In the cell from x_k to x_k+1,
+/// of length h:
 ///     u = (q - x_k) / h,  b = u,  a = 1 - u
 ///     linear:  f = a U_k + b U_k+1
 ///     cubic:   f = a U_k + b U_k+1 + ((a^3 - a) U''_k + (b^3 - b) U''_k+1) h^2 / 6,   U'' = M U

@@ -13,8 +13,8 @@ namespace abbe::calib {
 /// Range, nodes and reference of one linear axis.
 struct AxisNodes {
   std::vector<double> nodes_m;  ///< strictly ascending, both ends of the range included
-  /// positioning and rotation errors are zero at this position in gauge G2 (gauge.hpp); must be
-  /// inside the range
+  /// positioning and rotation errors are zero at this position in datum G2 (model_datum.hpp); must
+  /// be inside the range
   double reference_m = 0.0;
 };
 

@@ -52,7 +52,7 @@ struct Parameter {
   std::string name;
   std::optional<double> position_m;  ///< node on its axis; nullopt for squareness and "k_" names
   double value = 0.0;
-  double u = 0.0;  ///< standard uncertainty (k = 1) in the model's gauge, unit of `value`
+  double u = 0.0;  ///< standard uncertainty (k = 1) in the model's datum, unit of `value`
   [[nodiscard]] bool is_angle() const;
 };
 

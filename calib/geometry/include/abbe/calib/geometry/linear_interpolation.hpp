@@ -1,7 +1,7 @@
 #pragma once
 /// Linear interpolation of an error table between its nodes. The other interpolations
 /// (geometry/axis_interpolation.hpp) also reproduce constants and straight lines exactly, because
-/// the gauge conditions (gauge.hpp) rely on this property.
+/// the datum conditions (model_datum.hpp) rely on this property.
 
 #include <cstddef>
 #include <span>

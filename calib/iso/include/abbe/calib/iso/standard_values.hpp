@@ -2,7 +2,7 @@
 /// Values of the standards for machine tools, computed from a model: what a certificate states.
 /// All values follow from V (volumetric_model.hpp) of the functional point, for the first tool
 /// offset of the model, along straight lines inside the validity volume. They do not change with a
-/// rigid motion of the whole volume; they are therefore the same in every gauge.
+/// rigid motion of the whole volume; they are therefore the same in every datum.
 ///
 /// Uncertainty: each value f is a linear function of the parameters, f = a U, u^2 = a cov(U) a^T
 /// ([GUM] 5.2.2 eq. (13)). A range max - min is the difference l at the two positions at which it
@@ -86,7 +86,7 @@ struct Straightness {
 ///     EC0Y = -s_y(V_x) - s_x(V_y)     Y relative to X
 ///     EB0Z = +s_z(V_x) + s_x(V_z)     Z relative to X
 ///     EA0Z = -s_z(V_y) - s_y(V_z)     Z relative to Y
-/// In gauge G2 the squareness parameters of a model refer to the lines between the end points of
+/// In datum G2 the squareness parameters of a model refer to the lines between the end points of
 /// the straightness tables; they differ from these values by the slopes of these tables.
 struct Squareness {
   std::string name;
@@ -134,7 +134,7 @@ struct StandardValues {
 /// DegenerateGeometry if the model has no validity volume.
 [[nodiscard]] Result<StandardValues> standard_values(const VolumetricModel&);
 
-/// |V| over a regular lattice of points of the box, in the gauge of the model.
+/// |V| over a regular lattice of points of the box, in the datum of the model.
 struct VolumeError {
   std::size_t points = 0;
   double mean_m = 0.0, rms_m = 0.0;  ///< |V| before compensation

@@ -21,7 +21,7 @@ struct Contribution {
                                                               const CommonTables&);
 
 /// Root mean square of the standard uncertainties of the nodes of a table; of a squareness error,
-/// its standard uncertainty. In gauge G2 of the model.
+/// its standard uncertainty. In datum G2 of the model.
 struct TableUncertainty {
   std::string table;      ///< "EXX", "EC0Y"
   bool is_angle = false;  ///< rad, else m

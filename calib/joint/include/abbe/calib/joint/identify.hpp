@@ -1,7 +1,7 @@
 #pragma once
 /// Joint identification: one model from several parts (part.hpp) that were tested against each
 /// other before. With R_k, z_k of the parts, all parts together minimise
-///     sum_k |R_k x - z_k|^2 + |effects|^2,    x = (e, effects),   U = N e in gauge G2
+///     sum_k |R_k x - z_k|^2 + |effects|^2,    x = (e, effects),   U = N e in datum G2
 /// The information is a sum, so the covariance of the result is never larger than that of a part
 /// alone (as matrices), and neither is the uncertainty of V at any position.
 ///
@@ -125,7 +125,7 @@ struct EffectEstimate {
 };
 
 struct JointModel {
-  VolumetricModel model;  ///< gauge G2, for the tool of the common tables
+  VolumetricModel model;  ///< datum G2, for the tool of the common tables
   std::vector<EffectEstimate> effects;
   std::size_t rank = 0;
   double condition = 0.0;

@@ -1,7 +1,7 @@
 #pragma once
 /// Parts of a joint identification: what one method (or one run of it) states about the tables of a
 /// machine. Every part is an Information about the same unknowns,
-/// 1. the parameters U of the common tables in gauge G2 (the conditions of the gauge are exact),
+/// 1. the parameters U of the common tables in datum G2 (the conditions of the datum are exact),
 /// 2. effects: errors of instruments, artefacts and scales, each with the prior N(0, 1). Effects of
 ///    the same name are the same error in several parts.
 /// Nuisances of one part (pose of the tracker, poses of the array) are already eliminated.
@@ -38,7 +38,7 @@ struct CommonTables {
   TableBasis basis;
   Vector3 tool_offset_m = Vector3::Zero();
 };
-/// The tables of a model. NotApplicable unless it has tables in gauge G2 for one tool, without
+/// The tables of a model. NotApplicable unless it has tables in datum G2 for one tool, without
 /// dependence on the direction of travel.
 [[nodiscard]] Result<CommonTables> tables_of(const VolumetricModel&);
 
@@ -90,7 +90,7 @@ struct CommonEffects {
 /// The part of an on-the-fly run: its model with its covariance, which contains all effects of the
 /// run. `effects` are those that the covariance contains and that other parts share: they are
 /// separated from the covariance and become unknowns of the part.
-/// NotApplicable for other nodes, tables or axes than the common ones, or another gauge; and if the
+/// NotApplicable for other nodes, tables or axes than the common ones, or another datum; and if the
 /// covariance is not larger than the effects, or leaves a combination without uncertainty.
 [[nodiscard]] Result<Part> part_of_run(std::string name, const VolumetricModel&,
                                        const CommonTables&, const CommonEffects& = {});
@@ -108,7 +108,7 @@ struct ArrayOptions {
   /// Parameters of the common tables at which the poses are computed; empty: zero.
   Eigen::VectorXd linearised_at{};
 };
-/// The part of a ball array (evemu/solve/pose_blocks.hpp). NotApplicable for another order of the
+/// The part of a ball array (evemu/solve/pose_groups.hpp). NotApplicable for another order of the
 /// axes. TooFewObservations without ball errors, or if s is to be estimated from fewer than 20
 /// degrees of freedom; BadInput for a ball beyond the nodes of the common tables (they are not
 /// extrapolated), or if s is larger than `most_s_m`, naming the mistakes without which it is not.

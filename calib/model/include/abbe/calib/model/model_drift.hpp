@@ -1,9 +1,9 @@
 #pragma once
 /// Has the machine changed since the active model was identified? Tests a model of a new run
-/// against the active one. Both are tables in gauge G2, with the same axes, nodes and tools; the
+/// against the active one. Both are tables in datum G2, with the same axes, nodes and tools; the
 /// difference of their parameters then has no part that no measurement shows:
 ///     d = U_new - U_active,   C = C_new + C_active,   d ~ N(0, C) if nothing changed
-/// C is regular in the coordinates that the conditions of the gauge leave free; combinations for
+/// C is regular in the coordinates that the conditions of the datum leave free; combinations for
 /// which both models state no uncertainty (singular values of the scaled C below 1e-10 of the
 /// largest) are not tested.
 ///
@@ -11,7 +11,7 @@
 /// changed? With the whitened difference w and the whitened columns W of the table
 ///     X2 = |P w|^2,   P: projection onto the columns W
 /// which is chi-square with rank(W) degrees of freedom if nothing changed. The other tables are
-/// taken as unchanged, because the uncertainty of one table in gauge G2 contains that of all the
+/// taken as unchanged, because the uncertainty of one table in datum G2 contains that of all the
 /// others. The tests:
 /// - squareness: its value; positioning and rotations: a line through the reference; straightness:
 ///   a parabola. One degree of freedom each: a change of scale or a bow is the most frequent.
@@ -98,7 +98,7 @@ struct DriftTest {
 /// and how many more there are; or that no single table explains the change. Empty without drift.
 [[nodiscard]] std::string text(const DriftTest&);
 
-/// NotApplicable, with the first difference: one of the models is no table in gauge G2, or they
+/// NotApplicable, with the first difference: one of the models is no table in datum G2, or they
 /// have other axes, tables, nodes, references or tools. Parameters of both can then not be compared
 /// one by one.
 [[nodiscard]] Result<void> check_same_parameters(const VolumetricModel& a,

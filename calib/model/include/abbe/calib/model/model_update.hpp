@@ -1,14 +1,14 @@
 #pragma once
 /// Continuous calibration: combines the model of a new run with the previous model of the machine,
-/// whose information is weakened for the time between them. Both are tables in gauge G2 with the
-/// same parameters (check_same_parameters). In the coordinates e that the conditions of the gauge
+/// whose information is weakened for the time between them. Both are tables in datum G2 with the
+/// same parameters (check_same_parameters). In the coordinates e that the conditions of the datum
 /// leave free, with G the part of the uncertainty that all runs have in common (UpdateOptions),
 ///     Cov_previous = (C_previous - G G^T) / forgetting + Q,   Cov_run = C_run - G G^T
 ///     [ W_previous ]       [ W_previous e_previous ]
 ///     [   W_run    ] e  =  [      W_run e_run      ],   W^T W = Cov^-1
 /// is solved in square-root form (estimation/information.hpp). The covariance of the result,
 /// (Cov_previous^-1 + Cov_run^-1)^-1 + G G^T, is never larger than that of the run alone. Without
-/// forgetting, process noise and G the result is the joint adjustment of the rows of both runs,
+/// forgetting, process noise and G the result is the adjustment of the rows of both runs,
 /// each with its own station of the tracker.
 ///
 /// Process noise Q is a random walk of every table: after t days each node has changed by
@@ -70,7 +70,7 @@ struct ModelWithOffset {
   std::optional<OffsetInModel> range_offset{};
 };
 
-/// Chain, nodes, gauge and tool offsets are those of `run`. The validity volume is that of
+/// Chain, nodes, datum and tool offsets are those of `run`. The validity volume is that of
 /// `previous`, and that of `run` if a table is renewed. Pure.
 /// NotApplicable as check_same_parameters(), if a model depends on the direction of travel, if a
 /// covariance is not larger than the part that is stated as common, or leaves a combination without

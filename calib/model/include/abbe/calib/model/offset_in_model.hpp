@@ -6,7 +6,7 @@
 
 namespace abbe::calib {
 
-/// Estimate of the range offset d together with the parameters U of a model in gauge G2, with the
+/// Estimate of the range offset d together with the parameters U of a model in datum G2, with the
 /// covariance C. Given d, the model and its covariance are
 ///     U - dU_dd (d - value),   C - u^2 dU_dd dU_dd^T
 /// so that runs with one and the same offset can be combined (joint/part.hpp, model_update.hpp).

@@ -20,7 +20,7 @@
 /// nodes, with natural or not-a-knot ends), or polynomials without tables (equivalent model of a
 /// ball array). Gate, grid, comparison and export treat all forms alike: nodes() and
 /// linear_between_nodes() describe them. Values and uncertainties refer to the
-/// gauge of the model; compare two models with rigid_free_difference().
+/// datum of the model; compare two models with rigid_free_difference().
 
 #include <Eigen/Core>
 #include <optional>
@@ -34,15 +34,15 @@
 #include "abbe/calib/geometry/table_basis.hpp"
 #include "abbe/calib/geometry/travel_differences.hpp"
 #include "abbe/calib/geometry/validity_volume.hpp"
-#include "abbe/calib/model/gauge.hpp"
 #include "abbe/calib/model/misfit.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 #include "abbe/calib/model/polynomial_model.hpp"
 
 namespace abbe::calib {
 
 struct VolumetricError {
   Vector3 V_m = Vector3::Zero();       ///< NaN if !tool_ok
-  Matrix3 cov_V_m2 = Matrix3::Zero();  ///< k = 1, in the model's gauge; NaN if !tool_ok
+  Matrix3 cov_V_m2 = Matrix3::Zero();  ///< k = 1, in the model's datum; NaN if !tool_ok
   bool inside = false;                 ///< the axis position is in the validity volume
   bool tool_ok = false;                ///< the model is valid for this tool offset
 };
@@ -68,7 +68,7 @@ struct PolynomialForm {
 struct ModelDescription {
   KinematicChain chain;
   MachineNodes nodes;
-  Gauge gauge = Gauge::G1;
+  ModelDatum datum = ModelDatum::G1;
   /// Tool offsets of the measurements.
   /// - One offset: the model is valid for this tool only.
   /// - Several offsets on a line (all 18 tables): valid for tools on this line; the rotation about
@@ -104,18 +104,18 @@ class VolumetricModel {
   /// `U`: the model_size() parameters of the layout; `covariance`: their covariance;
   /// `interpolation`: of all tables.
   [[nodiscard]] static Result<VolumetricModel> from_vector(
-      const ParameterLayout&, Gauge, std::span<const Vector3> tool_offsets_m,
+      const ParameterLayout&, ModelDatum, std::span<const Vector3> tool_offsets_m,
       const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume,
       Interpolation interpolation = Interpolation::Linear);
   /// The same with the tables of a basis, and their interpolation.
-  [[nodiscard]] static Result<VolumetricModel> from_vector(const TableBasis&, Gauge,
+  [[nodiscard]] static Result<VolumetricModel> from_vector(const TableBasis&, ModelDatum,
                                                            std::span<const Vector3> tool_offsets_m,
                                                            const Eigen::VectorXd& U,
                                                            const Eigen::MatrixXd& covariance,
                                                            ValidityVolume);
 
-  /// A polynomial model, valid for one tool. Gauge Ball1 or Ball1Blocks.
-  [[nodiscard]] static Result<VolumetricModel> from_polynomials(PolynomialModel, Gauge,
+  /// A polynomial model, valid for one tool. Datum Ball1 or Ball1Blocks.
+  [[nodiscard]] static Result<VolumetricModel> from_polynomials(PolynomialModel, ModelDatum,
                                                                 const Vector3& tool_offset_m,
                                                                 ValidityVolume);
 
@@ -182,7 +182,7 @@ class VolumetricModel {
   /// What the misfit adds to the covariance of V, for a tool for which the model is valid.
   [[nodiscard]] Matrix3 misfit_cov_V_m2(const Vector3& axis_position_m,
                                         const Vector3& tool_offset_m) const;
-  [[nodiscard]] Gauge gauge() const { return gauge_; }
+  [[nodiscard]] ModelDatum datum() const { return datum_; }
   [[nodiscard]] std::span<const Vector3> tool_offsets_m() const { return tool_offsets_m_; }
   [[nodiscard]] const ValidityVolume& validity() const { return validity_; }
   [[nodiscard]] const Eigen::VectorXd& U() const { return U_; }
@@ -204,7 +204,7 @@ class VolumetricModel {
 
   Form form_;
   MachineNodes nodes_;
-  Gauge gauge_ = Gauge::G1;
+  ModelDatum datum_ = ModelDatum::G1;
   std::vector<Vector3> tool_offsets_m_;
   bool holds_for_any_tool_ = false;
   Vector3 tool_line_ = Vector3::Zero();  ///< unit vector; zero: the model is valid for one tool

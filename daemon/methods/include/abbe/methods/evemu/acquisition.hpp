@@ -34,7 +34,7 @@ struct RotationPoints {
 struct EvemuRequest {
   calib::evemu::Calibrator calibrator;
   calib::evemu::TouchPlan plan;
-  std::optional<RotationPoints> reference;
+  std::optional<RotationPoints> rotation_reference;
   std::vector<InputFile> sources;  ///< files from which the request was read
 };
 

@@ -25,7 +25,7 @@ struct EvemuCandidate {
 struct EvemuTask {
   calib::evemu::Observations observations;
   calib::evemu::JudgeOptions judging;
-  std::optional<RotationPoints> reference{};  ///< points where V is known
+  std::optional<RotationPoints> rotation_reference{};  ///< points where V is known
 };
 /// The observations of an acquired run. `order`, `positions`: without a value those of [evemu] and
 /// of the request.

@@ -36,13 +36,13 @@ struct RunPoint {
   bool usable = true;
 };
 
-/// Points of a run, stored in blocks: push_back() never copies earlier points.
+/// Points of a run, stored in chunks: push_back() never copies earlier points.
 class RunPoints {
  public:
-  static constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
-  /// Shared, because the live tables read full blocks on another thread: these are not changed
+  static constexpr std::size_t kPointsInChunk = 1024;  // 56 KiB: a second of a fast tracker
+  /// Shared, because the live tables read full chunks on another thread: these are not changed
   /// while the run goes on.
-  using Block = std::shared_ptr<RunPoint[]>;
+  using Chunk = std::shared_ptr<RunPoint[]>;
 
   void push_back(const RunPoint& point);
   void pop_back() noexcept { --size_; }
@@ -52,16 +52,16 @@ class RunPoints {
   /// All points in one vector; O(n).
   [[nodiscard]] std::vector<RunPoint> joined() const;
 
-  [[nodiscard]] std::size_t full_blocks() const noexcept { return size_ / kPointsInBlock; }
-  [[nodiscard]] const Block& full_block(std::size_t i) const { return blocks_[i]; }
-  /// The points behind the full blocks.
+  [[nodiscard]] std::size_t full_chunks() const noexcept { return size_ / kPointsInChunk; }
+  [[nodiscard]] const Chunk& full_chunk(std::size_t i) const { return chunks_[i]; }
+  /// The points behind the full chunks.
   [[nodiscard]] std::vector<RunPoint> tail() const;
 
  private:
   [[nodiscard]] const RunPoint& at(std::size_t i) const noexcept {
-    return blocks_[i / kPointsInBlock][i % kPointsInBlock];
+    return chunks_[i / kPointsInChunk][i % kPointsInChunk];
   }
-  std::vector<Block> blocks_;
+  std::vector<Chunk> chunks_;
   std::size_t size_ = 0;
 };
 
@@ -75,8 +75,8 @@ struct LegBegun {
 
 /// What was added to a run since the last call of OtfAcquisition::take_news().
 struct RunNews {
-  std::vector<RunPoints::Block> blocks;  ///< full ones
-  std::vector<RunPoint> tail;            ///< copy of all points behind the full blocks
+  std::vector<RunPoints::Chunk> chunks;  ///< full ones
+  std::vector<RunPoint> tail;            ///< copy of all points behind the full chunks
   std::vector<LegBegun> legs;
   EnvironmentEffect environment;  ///< mean of the run so far
 };
@@ -211,7 +211,7 @@ class OtfAcquisition {
   std::size_t marked_ = 0;        // number of all marks
   std::deque<LegBegun> legs_;     // not yet taken by take_news()
   std::size_t begun_leg_ = 0;     // the last that was added to legs_
-  std::size_t blocks_taken_ = 0;  // by take_news()
+  std::size_t chunks_taken_ = 0;  // by take_news()
   protocol::HostTime axes_known_at_{};
   protocol::HostTime last_time_{};
   std::optional<protocol::DeviceTime> last_device_time_;

@@ -37,7 +37,7 @@ class OtfLiveTables {
   calib::MachineNodes nodes_;
   std::vector<calib::otf::Nest> nests_;  // points in a nest are not of the path
   calib::otf::RunningEstimate estimate_;
-  std::vector<RunPoints::Block> blocks_;
+  std::vector<RunPoints::Chunk> chunks_;
   std::vector<RunPoint> tail_;
   std::vector<LegBegun> legs_;
   std::size_t next_point_ = 0, next_leg_ = 0;  // that the estimate does not contain

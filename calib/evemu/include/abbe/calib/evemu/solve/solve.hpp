@@ -12,13 +12,13 @@
 ///                     by cross-validation; covariance by bootstrap (see CovarianceKind)
 ///
 /// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp).
-/// This rotation is set to that of the measured blocks (gauge Ball1-blocks), and its uncertainty is
+/// This rotation is set to that of the measured blocks (datum Ball1-blocks), and its uncertainty is
 /// in the covariance.
 ///
 /// Errors of the array that all positions share (artefact_rows.hpp) are not estimated: the
 /// coefficients c do not depend on their uncertainty. With the hyper-parameters fixed, c is linear
 /// in the observations, c = K y, and the array's errors add to the covariance of c ([GUM] 5.1.2 eq.
-/// (10); A: artefact_rows(), T: transformation to the gauge)
+/// (10); A: artefact_rows(), T: transformation to the datum)
 ///     T (K A)(K A)^T T^T.
 /// The bootstrap draws errors of the array once per run. Errors of the array also enlarge the
 /// residuals, and with them s and w; their effect is therefore counted twice.
@@ -141,7 +141,7 @@ struct MeanRotation {
   Vector3 removed_rad = Vector3::Zero();
   Matrix3 cov_rad2 = Matrix3::Zero();  ///< included in the model's covariance
   bool referenced = false;  ///< measured by another instrument; else V is correct in shape only
-  std::optional<ReferenceFit> reference{};  ///< from with_rotation_reference()
+  std::optional<ReferenceFit> rotation_reference{};  ///< from with_rotation_reference()
 };
 
 struct Solution {

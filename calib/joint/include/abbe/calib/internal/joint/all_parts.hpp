@@ -1,5 +1,5 @@
 #pragma once
-/// The adjustment of all parts in the coordinates of the gauge (joint/identify.hpp), and what it
+/// The adjustment of all parts in the coordinates of the datum (joint/identify.hpp), and what it
 /// becomes if one part differs from all others in one combination of the coordinates.
 
 #include <Eigen/Core>
@@ -7,14 +7,14 @@
 #include <span>
 #include <vector>
 
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/joint/part.hpp"
 
 namespace abbe::calib::joint {
 
 class AllParts {
  public:
-  AllParts(std::span<const Part>, const GaugeCoordinates&);
+  AllParts(std::span<const Part>, const DatumCoordinates&);
 
   /// Part `part` observes e + `column` d, all other parts e: the estimate of d.
   struct Directed {

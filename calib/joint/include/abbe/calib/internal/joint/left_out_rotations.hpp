@@ -19,7 +19,7 @@ class LeftOutRotations {
   /// 3 x size(): effect on V at a reading.
   [[nodiscard]] Eigen::Matrix3Xd B(const Vector3& reading_m) const;
   /// basis.size() x size(): effect on the parameters that the same tables have for the other tool,
-  /// in gauge G2. DegenerateGeometry as estimation::Datum::transformation().
+  /// in datum G2. DegenerateGeometry as estimation::Datum::transformation().
   [[nodiscard]] Result<Eigen::MatrixXd> of_parameters() const;
 
  private:

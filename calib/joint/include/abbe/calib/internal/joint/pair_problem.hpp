@@ -1,12 +1,12 @@
 #pragma once
-/// The adjustment of two parts in the coordinates of the gauge (joint/identify.hpp).
+/// The adjustment of two parts in the coordinates of the datum (joint/identify.hpp).
 
 #include <Eigen/Core>
 #include <string>
 #include <vector>
 
 #include "abbe/calib/internal/joint/determining_rows.hpp"
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 #include "abbe/calib/joint/identify.hpp"
 
 namespace abbe::calib::joint {
@@ -19,7 +19,7 @@ struct Disagreement {
 
 class PairProblem {
  public:
-  PairProblem(const Part& i, const Part& j, const GaugeCoordinates&);
+  PairProblem(const Part& i, const Part& j, const DatumCoordinates&);
 
   [[nodiscard]] const DeterminingRows& of_i() const { return i_; }
   [[nodiscard]] const DeterminingRows& of_j() const { return j_; }

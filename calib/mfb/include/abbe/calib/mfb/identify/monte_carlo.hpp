@@ -23,7 +23,7 @@ struct MonteCarloOptions {
 struct MonteCarlo {
   std::size_t trials = 0;
   std::uint64_t seed = 0;
-  /// Of the parameters of the model, in the order of ParameterLayout; 0 where the gauge fixes them.
+  /// Of the parameters of the model, in the order of ParameterLayout; 0 where the datum fixes them.
   /// mean_error: mean of the trials minus the parameters of the solution, which the simulated
   /// machine has: it shows what the linearisation neglects.
   Eigen::VectorXd mean_error, standard_deviation;

@@ -18,7 +18,7 @@ namespace abbe::calib::mfb {
 
 struct ErrorUncertainty {
   std::string name;    ///< "EXX", "EC0Y"
-  double rms_u = 0.0;  ///< over the nodes that the gauge leaves free; m or rad
+  double rms_u = 0.0;  ///< over the nodes that the datum leaves free; m or rad
   double max_u = 0.0;
   bool is_angle = false;
 };

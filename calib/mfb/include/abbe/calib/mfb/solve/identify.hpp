@@ -64,7 +64,7 @@ struct LikelyCause {
 struct Identification {
   Observations observations;
   Solution solution;
-  /// 18 tables and squareness, gauge G2, tool offsets of the plan. Its validity volume is the box
+  /// 18 tables and squareness, datum G2, tool offsets of the plan. Its validity volume is the box
   /// of the touched readings inside the nodes: every error is determined at every node.
   VolumetricModel model;
   std::vector<SetAsideTouch> set_aside;

@@ -1,10 +1,10 @@
 #pragma once
 /// Stage two: the 21 errors from the deviations of the points of interest, with their covariance.
 ///
-/// Joint: one weighted least-squares adjustment of all passes. Unknowns: the tables in gauge G2 and
-/// the squareness errors; per position the pose (3 translations, 3 rotations about the bar axes
-/// through the middle of the bar; roll with a prior), for each further tool 3 constants, for each
-/// pair 3 rates of drift and 3 constants of its second pass, an error of the temperature with
+/// Simultaneous: one weighted least-squares adjustment of all passes. Unknowns: the tables in datum
+/// G2 and the squareness errors; per position the pose (3 translations, 3 rotations about the bar
+/// axes through the middle of the bar; roll with a prior), for each further tool 3 constants, for
+/// each pair 3 rates of drift and 3 constants of its second pass, an error of the temperature with
 /// prior; for all positions the corrections of O_i and of alpha with the calibration as prior.
 /// Weight: the full covariance of the points of a pass, D C D^T, C: noise of the touches. Unknowns
 /// of a position are eliminated by QR; the rest by QR of the whitened, column-scaled rows.
@@ -14,7 +14,7 @@
 /// Order X, Y, Z from workpiece to tool only. Slopes of EAX are lost. Passes of a pair are
 /// averaged.
 ///
-/// Gauge: every table 0 at the reference of its axis, straightness 0 at both ends, slope of EAX
+/// Datum: every table 0 at the reference of its axis, straightness 0 at both ends, slope of EAX
 /// free. Not estimable: constants and rigid motions. Units: m, rad; k = 1.
 
 #include <Eigen/Core>
@@ -29,13 +29,13 @@
 
 namespace abbe::calib::mfb {
 
-enum class Estimator { Joint, Sequential };
-/// "joint", "sequential".
+enum class Estimator { Simultaneous, Sequential };
+/// "simultaneous", "sequential".
 [[nodiscard]] std::string_view name(Estimator);
 [[nodiscard]] std::optional<Estimator> estimator_named(std::string_view);
 
 struct SolveOptions {
-  Estimator estimator = Estimator::Joint;
+  Estimator estimator = Estimator::Simultaneous;
   /// Standard uncertainty of the roll of the bar as its reference plane shows it. 100 urad.
   double u_roll_rad = 100e-6;
   /// An error with a larger standard uncertainty at one of its nodes is one that the measurements
@@ -91,7 +91,7 @@ struct PairDrift {
 };
 
 struct Solution {
-  Eigen::VectorXd U;  ///< parameters of the model, gauge G2
+  Eigen::VectorXd U;  ///< parameters of the model, datum G2
   Eigen::MatrixXd covariance;
   Statistics statistics;
   std::vector<BarPose> poses;  ///< by position, as estimated

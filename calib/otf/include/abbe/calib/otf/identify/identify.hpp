@@ -1,8 +1,8 @@
 #pragma once
-/// The estimate of Options::estimator: observe() followed by solve(); for Estimator::Joint the
-/// observations are linearised at the solution in between (joint.hpp), and correlated noise is
-/// prewhitened after it (prewhitening.hpp). judge() is separate because it needs the active model
-/// and the limits.
+/// The estimate of Options::estimator: observe() followed by solve(); for Estimator::Simultaneous
+/// the observations are linearised at the solution in between (simultaneous.hpp), and correlated
+/// noise is prewhitened after it (prewhitening.hpp). judge() is separate because it needs the
+/// active model and the limits.
 
 #include "abbe/calib/otf/judge/judge.hpp"
 
@@ -15,9 +15,9 @@ struct Identification {
 /// Pure and deterministic: the same input gives bit-identical results.
 [[nodiscard]] Result<Identification> identify(std::span<const TrackerObservation>, const Machine&,
                                               const Path&, const Noise&, const Options& = {});
-/// The same, from blocks that are already averaged.
-[[nodiscard]] Result<Identification> identify_blocks(const BlockSeries&, const Machine&,
-                                                     const Path&, const Noise&,
-                                                     const Options& = {});
+/// The same, from segments that are already averaged.
+[[nodiscard]] Result<Identification> identify_segments(const SegmentSeries&, const Machine&,
+                                                       const Path&, const Noise&,
+                                                       const Options& = {});
 
 }  // namespace abbe::calib::otf

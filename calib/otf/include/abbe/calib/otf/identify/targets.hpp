@@ -1,13 +1,14 @@
 #pragma once
-/// Joint identification of all 18 tables from several runs, each with the reflector at another
-/// offset from the tool reference point. One run leaves rotations that displace its only target
-/// like translations; three targets that are not on a line determine them, and the model is valid
-/// for any tool. The tracker may be set up again between the runs: every run is aligned by itself
-/// and has six rigid unknowns of its own,
+/// Identification of all 18 tables from several runs in one adjustment, each with the reflector at
+/// another offset from the tool reference point. One run leaves rotations that displace its only
+/// target like translations; three targets that are not on a line determine them, and the model is
+/// valid for any tool. The tracker may be set up again between the runs: every run is aligned by
+/// itself and has six rigid unknowns of its own,
 ///     y_k = A_k (U, T_k, r_k) + noise,   k = 1 .. number of runs
 /// so an unknown constant error of each target offset does not matter. The information of the runs
-/// is added (estimation/information.hpp) and solved with the 24 conditions of gauge G2 for 18
-/// tables. With Estimator::Joint each run is linearised again at the common solution (joint.hpp).
+/// is added (estimation/information.hpp) and solved with the 24 conditions of datum G2 for 18
+/// tables. With Estimator::Simultaneous each run is linearised again at the common solution
+/// (simultaneous.hpp).
 ///
 /// With Options::nests each run has a drift of the tracker of its own, from its visits and the rows
 /// of all runs (tracker_drift.hpp). The nests are at the same places in the tracker frame in all

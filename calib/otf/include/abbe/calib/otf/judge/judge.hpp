@@ -9,7 +9,7 @@
 /// machine; no model contains this motion. Therefore, on each held-out fold, the best-fit rigid
 /// motion (six parameters, same rows) is removed from the residuals of no compensation, candidate
 /// and active model separately, and the remaining residuals are compared. So the comparison is also
-/// independent of the gauges.
+/// independent of the datums.
 
 #include <cstddef>
 #include <functional>
@@ -35,7 +35,7 @@ using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double n
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 
-/// The same for the joint adjustment of several runs (targets.hpp). The folds are those of each
+/// The same for the common adjustment of several runs (targets.hpp). The folds are those of each
 /// run. `solutions`: of the runs, if the observations are those of without_run_effects(); the drift
 /// of the tracker in a single run is then estimated again without the held-out legs.
 [[nodiscard]] Result<HeldOutFigures> held_out(std::span<const Observations>,
@@ -48,7 +48,7 @@ using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double n
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&,
                                     const VolumetricModel* active, const GateLimits& = {},
                                     const Options& = {}, const HeldOutRow& row = {});
-/// The same for the joint adjustment of several runs (targets.hpp): one solution per run, all with
+/// The same for the common adjustment of several runs (targets.hpp): one solution per run, all with
 /// the same model. The evidence for the orientation of the path is that of the first run.
 [[nodiscard]] Result<Verdict> judge(std::span<const Observations>, std::span<const Solution>,
                                     const VolumetricModel* active, const GateLimits& = {},

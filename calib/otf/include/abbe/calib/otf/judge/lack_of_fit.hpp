@@ -7,7 +7,7 @@
 /// - another design matrix: another order of the axes, or closer nodes.
 ///
 /// With the residuals r of the model, the weights W of the rows (1/sigma) and Q = (A^T W^2 A)^-1,
-/// restricted by the gauge conditions (estimation/datum.hpp):
+/// restricted by the datum conditions (estimation/datum.hpp):
 ///     S = C^T W^2 C - C^T W^2 A Q A^T W^2 C,   d = S^+ C^T W^2 r
 ///     decrease of chi2 = d^T C^T W^2 r
 ///     dU = Q A^T W^2 C d: error of U if the alternative is true but not modelled

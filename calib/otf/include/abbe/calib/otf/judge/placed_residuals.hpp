@@ -21,7 +21,7 @@ struct PlacedResidual {
   /// Length of the path from its first vertex to the row [m].
   double way_m = 0.0;
   std::size_t leg = 0;             ///< Observation::leg
-  std::optional<double> time_s{};  ///< of the row's block, Observations::block_s
+  std::optional<double> time_s{};  ///< of the row's segment, Observations::segment_s
   Vector3 axis_position_m = Vector3::Zero();
   std::size_t component = 0;  ///< Observation::component
   double sigma_m = 1.0;       ///< standard uncertainty of the row

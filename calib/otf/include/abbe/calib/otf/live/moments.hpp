@@ -71,8 +71,8 @@ class MomentAccumulator {
     std::size_t rows = 0;
   };
   [[nodiscard]] WithinCells within_cells() const;
-  /// Of all samples added so far; more can be added. Takes about as long as the adjustment of block
-  /// means (otf/solve/solve.hpp).
+  /// Of all samples added so far; more can be added. Takes about as long as the adjustment of
+  /// segment means (otf/solve/solve.hpp).
   [[nodiscard]] estimation::Information information() const;
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 /// The tables of a run that is not complete, with their uncertainties: pose of the tracker, moments
-/// of the samples (moments.hpp) and a solution in gauge G2 of what they determine so far.
+/// of the samples (moments.hpp) and a solution in datum G2 of what they determine so far.
 ///
 /// The pose fits pairs (axis position, sample) taken at the vertices. Its error is estimated by the
 /// six rigid unknowns, which are linear. With the rotation phi and the displacement D (largest,
@@ -11,7 +11,7 @@
 /// second order with phi = 3e-4 and L = 0.6 m are 0.08 um.
 ///
 /// An unknown is determined if no combination of the unknowns that meets the conditions of the
-/// gauge and that no observation sees contains it, and if its standard uncertainty is less than
+/// datum and that no observation sees contains it, and if its standard uncertainty is less than
 /// 0.05 mm or 0.05 mrad. A prior of 1 mm and 1 mrad makes the system regular; it changes a
 /// determined unknown by less than (0.05)^2 of its value.
 ///
@@ -36,7 +36,7 @@
 namespace abbe::calib::otf {
 
 struct NodeSoFar {
-  double value = 0.0, u = 0.0;  ///< m or rad, gauge G2; 0 if it is not determined
+  double value = 0.0, u = 0.0;  ///< m or rad, datum G2; 0 if it is not determined
   bool determined = false;
 };
 

@@ -1,10 +1,10 @@
 #pragma once
 /// Stage one: computes weighted linear observations of the machine's errors from tracker points and
-/// path. Each used block gives two rows, along a2 and a3 of its path frame. The component along the
-/// direction of travel is not used: without synchronised clocks it carries no information (weight 0
-/// in [Sanders 2023] eq. (4)). With scale readings along_rows.hpp adds it. In standstill mode each
-/// position gives three rows, see observe_standstills.hpp; leg and block of a row are then its
-/// position and its standstill.
+/// path. Each used segment gives two rows, along a2 and a3 of its path frame. The component along
+/// the direction of travel is not used: without synchronised clocks it carries no information
+/// (weight 0 in [Sanders 2023] eq. (4)). With scale readings along_rows.hpp adds it. In standstill
+/// mode each position gives three rows, see observe_standstills.hpp; leg and segment of a row are
+/// then its position and its standstill.
 
 #include <Eigen/Core>
 #include <array>
@@ -43,7 +43,7 @@ struct Observation {
   double sigma_m = 1.0;  ///< standard uncertainty of y
   double weight = 1.0;   ///< in 1/m^2; 1/sigma^2 unless the caller sets another weight
   std::size_t leg = 0;
-  std::size_t block = 0;
+  std::size_t segment = 0;
   Vector3 direction = Vector3::UnitX();       ///< a2 or a3, machine coordinates
   Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal axis position
   std::size_t first_sub_point = 0;            ///< index in Observations::sub_points_m
@@ -74,12 +74,12 @@ struct Observations {
   std::vector<Vector3> covered_m{};      ///< axis positions; their hull is the validity volume
   std::size_t samples = 0;
   std::size_t lost_samples = 0;
-  std::size_t blocks = 0;
-  std::size_t blocks_used = 0;
-  /// Mean time by Observation::block, tracker's clock. Empty for blocks without times.
-  std::vector<double> block_s{};
+  std::size_t segments = 0;
+  std::size_t segments_used = 0;
+  /// Mean time by Observation::segment, tracker's clock. Empty for segments without times.
+  std::vector<double> segment_s{};
   std::size_t clock_unknowns = 0;  ///< kClockUnknowns with scale readings and unknown clocks
-  std::vector<std::size_t> beam_returned{};  ///< see BlockSeries
+  std::vector<std::size_t> beam_returned{};  ///< see SegmentSeries
   SetAside set_aside{};
   std::optional<DriftObservations> drift{};  ///< if nests were visited repeatedly
   /// The prior with which every adjustment of these rows is made.
@@ -99,10 +99,10 @@ struct Observations {
   [[nodiscard]] std::string label(std::size_t unknown) const;
 };
 
-/// One measured point (or block mean) relative to the path.
+/// One measured point (or segment mean) relative to the path.
 struct PointOnPath {
   std::size_t leg = 0;
-  std::size_t block = 0;
+  std::size_t segment = 0;
   Vector3 deviation_m = Vector3::Zero();      ///< measured minus closest nominal point
   Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal
   PathFrame frame;
@@ -138,9 +138,9 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 /// other nodes.
 [[nodiscard]] Observations with_basis(const Observations&, TableBasis);
 
-/// Observations of a run on the fly from blocks that are already averaged. No sample of them is
+/// Observations of a run on the fly from segments that are already averaged. No sample of them is
 /// excluded.
-[[nodiscard]] Result<Observations> observe_blocks(const BlockSeries&, const Machine&, const Path&,
-                                                  const Noise&, const Options& = {});
+[[nodiscard]] Result<Observations> observe_segments(const SegmentSeries&, const Machine&,
+                                                    const Path&, const Noise&, const Options& = {});
 
 }  // namespace abbe::calib::otf

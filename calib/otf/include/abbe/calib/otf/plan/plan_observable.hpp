@@ -14,11 +14,11 @@
 namespace abbe::calib::otf {
 
 struct Observability {
-  /// Errors that the path leaves undetermined in gauge G2: "EXX", "EC0Y". Empty: the path is
+  /// Errors that the path leaves undetermined in datum G2: "EXX", "EC0Y". Empty: the path is
   /// sufficient.
   std::vector<std::string> undetermined;
   std::size_t rank = 0;    ///< of the legs that were evaluated
-  std::size_t needed = 0;  ///< unknowns less the conditions of the gauge
+  std::size_t needed = 0;  ///< unknowns less the conditions of the datum
   std::string unused;      ///< legs that are not used because of backlash: note_on_unused()
 };
 

@@ -53,7 +53,7 @@ struct PlannedRun {
 
 struct TableUncertainty {
   std::string name;    ///< "EXX", or "EC0Y" of a squareness error
-  double rms_u = 0.0;  ///< over the nodes, gauge G2; m or rad
+  double rms_u = 0.0;  ///< over the nodes, datum G2; m or rad
   double max_u = 0.0;
 };
 
@@ -75,7 +75,7 @@ struct Prediction {
   std::vector<std::string> left_out;
   std::size_t observations = 0, unknowns = 0;
   std::size_t rank = 0;          ///< of the data
-  std::size_t datum_defect = 0;  ///< combinations that the gauge fixes
+  std::size_t datum_defect = 0;  ///< combinations that the datum fixes
   double condition = 0.0;        ///< of the column-scaled data
   double length_m = 0.0;
   double duration_s = 0.0;

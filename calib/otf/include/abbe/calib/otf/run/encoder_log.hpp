@@ -1,7 +1,7 @@
 #pragma once
 /// Scale readings of a run, with times of the machine's clock, and the relation of this clock to
 /// that of the tracker:
-///     t_machine = t + offset + drift (t - reference)
+///     t_machine = t + offset + drift (t - origin)
 /// t: time of the tracker. The times of the readings have white, Gaussian errors.
 
 #include <optional>
@@ -20,12 +20,12 @@ struct EncoderReading {
 };
 
 struct ClockMap {
-  double offset_s = 0.0;     ///< machine's clock minus tracker's clock at `reference_s`
-  double drift = 0.0;        ///< relative; 1e-6: the machine's clock is fast by 1 us per second
-  double reference_s = 0.0;  ///< tracker's clock
+  double offset_s = 0.0;  ///< machine's clock minus tracker's clock at `origin_s`
+  double drift = 0.0;     ///< relative; 1e-6: the machine's clock is fast by 1 us per second
+  double origin_s = 0.0;  ///< tracker's clock
 
   [[nodiscard]] double machine_s(double tracker_s) const {
-    return tracker_s + offset_s + drift * (tracker_s - reference_s);
+    return tracker_s + offset_s + drift * (tracker_s - origin_s);
   }
 };
 

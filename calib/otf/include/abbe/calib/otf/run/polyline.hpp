@@ -19,7 +19,7 @@ struct LegPoint {
 [[nodiscard]] LegPoint closest_on_leg(const Vector3& from_m, const Vector3& to_m,
                                       const Vector3& p_m);
 
-/// Position of a point relative to the line segment of a leg, whose length may be 0.
+/// Position of a point relative to the straight line of a leg, whose length may be 0.
 struct OnLeg {
   double off_m = 0.0;    ///< distance to the nearest point of the leg
   double along_m = 0.0;  ///< distance of that point from the beginning of the leg

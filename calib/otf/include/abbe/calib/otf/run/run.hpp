@@ -37,7 +37,7 @@ struct Machine {
 };
 
 /// Polyline of the path; a vertex is an axis position (scale readings) in m with an exact stop, a
-/// leg is the straight segment between two consecutive vertices. Start, end and centroid of the
+/// leg is the straight line between two consecutive vertices. Start, end and centroid of the
 /// path must not be on a line, because they determine the rough alignment. A leg shorter than twice
 /// Options::corner_m is not used.
 struct Path {
@@ -90,10 +90,10 @@ enum class Mode { OnTheFly, Standstill };
 /// TwoStep: the alignment first, then one linear adjustment ([Sanders 2023]). The rotation that the
 /// alignment takes from the errors of the machine remains in the second order: 0.025 um for errors
 /// of 0.1 mm.
-/// Joint: alignment and errors together, by Gauss-Newton from the result of TwoStep (joint.hpp);
-/// correlated noise is prewhitened (prewhitening.hpp).
-enum class Estimator { TwoStep, Joint };
-/// In files and messages: "two-step", "joint".
+/// Simultaneous: alignment and errors together, by Gauss-Newton from the result of TwoStep
+/// (simultaneous.hpp); correlated noise is prewhitened (prewhitening.hpp).
+enum class Estimator { TwoStep, Simultaneous };
+/// In files and messages: "two-step", "simultaneous".
 [[nodiscard]] std::string_view name(Estimator);
 [[nodiscard]] std::optional<Estimator> estimator(std::string_view name);
 
@@ -107,24 +107,25 @@ using Stopped = std::function<bool()>;
 
 struct Options {
   Mode mode = Mode::OnTheFly;
-  StandstillOptions standstill;            ///< of Mode::Standstill
-  Estimator estimator = Estimator::Joint;  ///< of Mode::OnTheFly; standstills: always TwoStep
+  StandstillOptions standstill;  ///< of Mode::Standstill
+  /// Of Mode::OnTheFly; standstills are always adjusted by TwoStep.
+  Estimator estimator = Estimator::Simultaneous;
   /// None: the tables are the mean of both directions of travel, and backlash stays in the
   /// residuals. Backlash, Tables: the differences between both directions are estimated, too, one
   /// value per table or one per node (backlash.hpp).
   TravelDependence backlash = TravelDependence::None;
-  /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
+  /// Samples per segment mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
   /// compared with nodes 50 mm apart.
-  std::size_t block_samples = 100;
+  std::size_t segment_samples = 100;
   /// Points closer than this to an end of their leg are not used: there the assignment to a leg is
-  /// uncertain and the machine accelerates. 10 mm also exceeds half the travel of a block, so that
-  /// no used block extends over a corner.
+  /// uncertain and the machine accelerates. 10 mm also exceeds half the travel of a segment, so
+  /// that no used segment extends over a corner.
   double corner_m = 0.010;
   /// Largest number of standstill samples at each end of the run. Their means are the measured
   /// first and last vertex. 20 samples are 40 ms at 500 Hz; samples of a machine that has left the
   /// vertex are not used.
   std::size_t standstill_samples = 20;
-  /// Number of sub-points of a block over which design rows are averaged. With 10 the result does
+  /// Number of sub-points of a segment over which design rows are averaged. With 10 the result does
   /// not differ from that with all samples.
   std::size_t row_points = 10;
   /// Fine alignment: minimum and maximum number of updates. The iteration stops when the relative
@@ -132,29 +133,29 @@ struct Options {
   int min_alignment_updates = 7;
   int max_alignment_updates = 200;
   double alignment_tolerance = 1e-6;
-  /// Number of updates in which blocks are assigned to legs. Later updates keep the assignment,
+  /// Number of updates in which segments are assigned to legs. Later updates keep the assignment,
   /// because they change the alignment by um, while legs are mm apart.
   int leg_assignment_updates = 5;
   /// Weight of the direction of travel in the leg assignment, in m: (0.02 m)^2 (1 - cos) is added
   /// to the squared distance.
   double leg_direction_m = 0.02;
-  /// Limits of the distance to the path after the alignment: rms of all blocks, and maximum of one
-  /// block or of one end of the path. AlignmentFailed above them. The gate accepts errors up to 1
-  /// mm, and their rms is lower. With the path of another run the distances are centimetres; so are
-  /// those of the last blocks of a truncated path.
+  /// Limits of the distance to the path after the alignment: rms of all segments, and maximum of
+  /// one segment or of one end of the path. AlignmentFailed above them. The gate accepts errors up
+  /// to 1 mm, and their rms is lower. With the path of another run the distances are centimetres;
+  /// so are those of the last segments of a truncated path.
   double max_alignment_rms_m = 1e-3;
   double max_alignment_distance_m = 3e-3;
   /// AlignmentFailed if measured and nominal length of the path differ by more than this fraction.
   /// A measured length that is too short may be explained by beam breaks.
   double max_length_mismatch = 0.05;
-  /// Joint: it stops when an adjustment changes the estimate by less than this fraction of its
-  /// standard uncertainty (root mean square over all combinations of the unknowns). Three
+  /// Simultaneous: it stops when an adjustment changes the estimate by less than this fraction of
+  /// its standard uncertainty (root mean square over all combinations of the unknowns). Three
   /// adjustments are usual; the second already changes it by a fifth of the uncertainty only.
   double adjustment_tolerance = 1e-3;
   int max_adjustments = 10;
-  /// Weight of the gauge conditions in the adjustment (DatumOptions::weight). Any positive value
+  /// Weight of the datum conditions in the adjustment (DatumOptions::weight). Any positive value
   /// gives the same solution (minimal constraints).
-  double gauge_weight = 1.0;
+  double datum_weight = 1.0;
   /// Number of folds of the cross-validation; the observations are assigned to folds by leg.
   std::size_t held_out_folds = 5;
   OrientationEvidence orientation;

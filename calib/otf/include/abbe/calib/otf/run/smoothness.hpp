@@ -8,8 +8,8 @@
 ///     b_i ~ N(0, (bend (h / 50 mm)^1.5)^2),   twice as large in rad for rotations
 /// The exponent 1.5 is that of a function whose second derivative is white noise ([Wahba 1978]:
 /// smoothing splines), so that the same `bend` means the same function for every distance of the
-/// nodes. Constants and straight lines have no bend: the prior does not change them, and the gauge
-/// of the data (gauge.hpp) remains free. Backlash and squareness have no such prior.
+/// nodes. Constants and straight lines have no bend: the prior does not change them, and the datum
+/// of the data (model_datum.hpp) remains free. Backlash and squareness have no such prior.
 ///
 /// The prior rows belong to the adjustment, with the data: covariance, held-out test and test for
 /// lack of fit contain them. The covariance is that of the estimate if the errors are as smooth as

@@ -39,9 +39,9 @@ namespace abbe::calib::otf {
 
 /// What an adjustment needs for the drift.
 struct DriftObservations {
-  std::vector<double> knots_s{};  ///< ascending, tracker clock
-  std::size_t datum = 0;          ///< the knot at the first visit: the drift there is 0
-  std::vector<double> block_s{};  ///< mean time by Observation::block
+  std::vector<double> knots_s{};    ///< ascending, tracker clock
+  std::size_t zero = 0;             ///< the knot at the first visit: the drift there is 0
+  std::vector<double> segment_s{};  ///< mean time by Observation::segment
   std::vector<NestVisit> visits{};
   std::vector<std::string> names{};  ///< of the nests
   double u_repeatability_m = 0.0;
@@ -56,7 +56,7 @@ struct DriftPoint {
 
 /// The estimated drift.
 struct TrackerDrift {
-  Eigen::VectorXd coefficients;      ///< of the hat functions, without those of the datum
+  Eigen::VectorXd coefficients;      ///< of the hat functions, without those of the zero
   std::vector<DriftPoint> points{};  ///< at the knots
   std::size_t visits = 0;            ///< used
   /// Standard uncertainty with which the visits were used, root mean square over its factors.

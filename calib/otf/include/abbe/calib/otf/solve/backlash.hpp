@@ -13,7 +13,7 @@
 /// Not estimable: differences between directions that the path does not show, for example of an
 /// axis that moves in one direction only. The prior N(0, kUOfBacklash^2) of each b or D leaves
 /// these at zero. With one value per table it does not change the model: b and a constant of the
-/// table then occur only as their sum, and the gauge fixes the constants of all tables. With one
+/// table then occur only as their sum, and the datum fixes the constants of all tables. With one
 /// value per node U is uncertain by half the prior where the path shows one direction only.
 
 #include <Eigen/Core>
@@ -35,7 +35,7 @@ namespace abbe::calib::otf {
 /// In the order of the unknowns; empty without backlash. `U`, `covariance`: of all unknowns.
 [[nodiscard]] std::vector<Backlash> backlash_of(const Observations&, const Eigen::VectorXd& U,
                                                 const Eigen::MatrixXd& covariance);
-/// The model of an adjustment with the unknowns U: gauge G2, mean of both directions, with the
+/// The model of an adjustment with the unknowns U: datum G2, mean of both directions, with the
 /// differences if they were estimated. `covariance`: of U. `tool_offsets_m`: of all runs.
 [[nodiscard]] Result<VolumetricModel> model_of(const Observations&,
                                                std::span<const Vector3> tool_offsets_m,

@@ -5,7 +5,7 @@
 /// them.
 ///
 /// The noise of a tracker is smallest along its beam and alike in all directions across it. The
-/// difference d of the residuals of two consecutive blocks of a leg, along the component c of a
+/// difference d of the residuals of two consecutive segments of a leg, along the component c of a
 /// row, contains noise and hardly any error of the machine. Its variance is
 ///     var d = c^T S c
 /// with the mean covariance S over the volume, which is estimated by weighted least squares.
@@ -25,7 +25,7 @@ struct OtherBeams {
   /// In which the noise is smallest, frame of the points; one of both signs.
   Vector3 direction = Vector3::UnitX();
   double angle_rad = 0.0;                ///< rms angle to the stated beams
-  double along_m = 0.0, across_m = 0.0;  ///< standard deviations of the differences of blocks
+  double along_m = 0.0, across_m = 0.0;  ///< standard deviations of the differences of segments
 };
 /// The direction of the beams, where the noise contradicts the stated place of the tracker (the
 /// origin of the frame of the points): in this direction it is smaller by a quarter or more than in

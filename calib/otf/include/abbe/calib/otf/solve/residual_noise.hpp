@@ -12,11 +12,12 @@ namespace abbe::calib::otf {
 /// Noise of the whitened residuals, in units of the stated standard uncertainty.
 struct ResidualNoise {
   double sigma0 = 1.0;  ///< square root of chi2 per degree of freedom
-  /// Noise between neighbouring blocks, from the median of second differences along a leg. Slow
+  /// Noise between neighbouring segments, from the median of second differences along a leg. Slow
   /// effects do not contribute to it.
   double local = 1.0;
   /// 1 + 2 * sum of the significant autocorrelations along a leg [Bartlett 1946]: the number of
-  /// correlated blocks that carry as much information as one independent block. 1 for white noise.
+  /// correlated segments that carry as much information as one independent segment. 1 for white
+  /// noise.
   double correlation = 1.0;
 
   /// Factor for the covariance computed with the stated, white noise; at least 1.

@@ -3,10 +3,10 @@
 /// adjustment minimises
 ///     |W (A U - y)|^2 + mu |K U|^2
 /// in square-root form (estimation/information.hpp; the pseudo-inverse of [Sanders 2023] eq. (7)
-/// gives the same fit in another gauge). A: design matrix, U: parameters, y: observations, W:
-/// diagonal, W^2: weights, K U = 0: gauge conditions (gauge.hpp). These conditions can be satisfied
-/// without changing the residuals; so they hold exactly, and the solution does not depend on mu
-/// (estimation/datum.hpp).
+/// gives the same fit in another datum). A: design matrix, U: parameters, y: observations, W:
+/// diagonal, W^2: weights, K U = 0: datum conditions (model_datum.hpp). These conditions can be
+/// satisfied without changing the residuals; so they hold exactly, and the solution does not depend
+/// on mu (estimation/datum.hpp).
 ///
 /// Covariance, with H = A^T W^2 A and Q = (H + mu K^T K)^-1:
 ///     Cov = Q H Q                      if the weights are 1/sigma^2
@@ -29,7 +29,7 @@
 /// columns C, with the information of the visits of nests and the prior in place of 1/u^2.
 ///
 /// VolumetricModel lists what is not estimable. Rank and condition refer to the column-scaled data,
-/// without the gauge.
+/// without the datum.
 
 #include <Eigen/Core>
 #include <array>
@@ -66,13 +66,13 @@ struct RowInformation {
 [[nodiscard]] RowInformation information_of(
     const Observations&, const std::function<bool(const Observation&)>& take = {});
 
-/// Parameters U in gauge G2, with their covariance caused by the noise of the rows. With
+/// Parameters U in datum G2, with their covariance caused by the noise of the rows. With
 /// Observations::smoothness `rank` is that of Statistics.
 using Adjustment = estimation::DatumSolution;
-/// RankDeficient if the rank defect of the data is larger than the number of gauge conditions. The
+/// RankDeficient if the rank defect of the data is larger than the number of datum conditions. The
 /// text names parameters that are not determined.
 [[nodiscard]] Result<Adjustment> adjust(const RowInformation&, const Observations&,
-                                        double gauge_weight = 1.0);
+                                        double datum_weight = 1.0);
 
 struct ResidualStatistics {
   double mean_abs_m = 0.0;
@@ -88,13 +88,13 @@ struct Residuals {
 };
 
 struct Statistics {
-  std::size_t samples = 0, lost_samples = 0, blocks = 0, blocks_used = 0;
+  std::size_t samples = 0, lost_samples = 0, segments = 0, segments_used = 0;
   std::size_t observations = 0;  ///< rows
   std::size_t unknowns = 0;      ///< columns
   /// With a prior for smooth tables: the number of combinations of the unknowns that the data
   /// determine, trace(Q A^T W^2 A), rounded.
   std::size_t rank = 0;
-  std::size_t gauge_conditions = 0;
+  std::size_t datum_conditions = 0;
   std::size_t degrees_of_freedom = 0;  ///< observations - rank
   double condition = 0.0;
   double chi2 = 0.0;
@@ -105,8 +105,8 @@ struct Statistics {
   /// product exceeds the 99.9 % quantile of chi2/dof for the stated uncertainties, else 1. After
   /// prewhitening both are of the prewhitened residuals.
   double variance_factor = 1.0;
-  /// Autocorrelation of the noise from block to block along a2 and a3 that prewhitening removed; 0
-  /// without it.
+  /// Autocorrelation of the noise from segment to segment along a2 and a3 that prewhitening
+  /// removed; 0 without it.
   std::array<double, 2> noise_correlation{};
   ResidualStatistics before;  ///< of Residuals::before_m
   ResidualStatistics after;   ///< of Residuals::after_m
@@ -139,14 +139,14 @@ struct FitOfRows {
   /// Of the rows, without range offset, drift and errors of two axes.
   std::vector<double> residual_m;
   Eigen::MatrixXd covariance_of_noise;  ///< of U, as far as the noise of the rows causes it
-  /// Over which the noise is correlated, s; for blocks without times in units of a block.
+  /// Over which the noise is correlated, s; for segments without times in units of a segment.
   double correlation_time = 0.0;
   std::optional<TwoAxisErrors> two_axes{};
 };
 
 struct Solution {
   Estimator estimator = Estimator::TwoStep;
-  VolumetricModel model;            ///< gauge G2, no rigid unknowns, mean of both directions
+  VolumetricModel model;            ///< datum G2, no rigid unknowns, mean of both directions
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::VectorXd clock{};  ///< corrections of the clock unknowns, if the observations have them
   Eigen::MatrixXd covariance_with_rigid;  ///< of all unknowns of Observations

@@ -1,6 +1,6 @@
 #pragma once
 /// The unknowns that all positions of the bar share:
-/// 1. the parameters of the model that gauge G2 leaves free: with the conditions K U = 0 of each
+/// 1. the parameters of the model that datum G2 leaves free: with the conditions K U = 0 of each
 ///    table one of its nodes is expressed by the others, in general it is zero,
 /// 2. the calibration of the bar, as g with dO = F g, F F^T = covariance, g ~ N(0, 1),
 /// 3. the error of alpha in units of its uncertainty, ~ N(0, 1),

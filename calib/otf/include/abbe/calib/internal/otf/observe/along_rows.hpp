@@ -1,19 +1,19 @@
 #pragma once
 /// The component along the direction of travel, from scale readings beside the tracker's points. A
-/// block that was measured at constant speed gives a third row:
+/// segment that was measured at constant speed gives a third row:
 ///     y = a1 . (p - q(t_m)),   sigma^2 = sigma_1^2 / n + (v sigma_t)^2 f
 /// a1: direction of travel of the target, p: measured point in the machine, target offset
-/// subtracted, q: scale readings at the machine's time t_m of the block (RunClock), n: samples in
-/// the block, sigma_1: standard uncertainty of a sample along a1 ([Sanders 2023] eq. (4) with a1),
-/// v: speed, sigma_t: EncoderLog::sigma_time_s, f: see EncoderLine::variance. The design of the row
-/// is that of a2 and a3, along a1. Corrections of offset and drift of the clocks are two more
-/// unknowns, with the columns v and v (t - reference), unless the clocks are known.
+/// subtracted, q: scale readings at the machine's time t_m of the segment (RunClock), n: samples in
+/// the segment, sigma_1: standard uncertainty of a sample along a1 ([Sanders 2023] eq. (4) with
+/// a1), v: speed, sigma_t: EncoderLog::sigma_time_s, f: see EncoderLine::variance. The design of
+/// the row is that of a2 and a3, along a1. Corrections of offset and drift of the clocks are two
+/// more unknowns, with the columns v and v (t - origin), unless the clocks are known.
 ///
 /// Readings that jump away from their neighbours and back are not used, and rows of up to three
-/// blocks beside each other that are off by seven standard deviations are left out: both are named
-/// in the notes.
+/// segments beside each other that are off by seven standard deviations are left out: both are
+/// named in the notes.
 ///
-/// q is that of a straight line through the readings of the time of the block: so the average of
+/// q is that of a straight line through the readings of the time of the segment: so the average of
 /// the readings is compared with the average of the samples.
 
 #include <Eigen/Core>
@@ -22,8 +22,8 @@
 #include <span>
 #include <vector>
 
-#include "abbe/calib/otf/observe/blocks.hpp"
 #include "abbe/calib/otf/observe/observe.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "abbe/calib/otf/run/encoder_log.hpp"
 
 namespace abbe::calib::otf {
@@ -41,23 +41,20 @@ struct EncoderLine {
 /// day since 1970 in steps of 0.24 us: sums with such a time lose the digits that an adjustment of
 /// the clocks needs; differences of two of them do not.
 struct RunClock {
-  double lag_s = 0.0;        ///< machine's clock at `reference_s`, since `log_start_s`
+  double lag_s = 0.0;        ///< machine's clock at `origin_s`, since `log_start_s`
   double drift = 0.0;        ///< as ClockMap::drift
-  double reference_s = 0.0;  ///< tracker's clock
+  double origin_s = 0.0;     ///< tracker's clock
   double log_start_s = 0.0;  ///< machine's clock at the first reading
 
-  [[nodiscard]] static RunClock of(const ClockMap& map, double reference_s, double log_start_s) {
-    return {
-        map.offset_s + (reference_s - log_start_s) + map.drift * (reference_s - map.reference_s),
-        map.drift, reference_s, log_start_s};
+  [[nodiscard]] static RunClock of(const ClockMap& map, double origin_s, double log_start_s) {
+    return {map.offset_s + (origin_s - log_start_s) + map.drift * (origin_s - map.origin_s),
+            map.drift, origin_s, log_start_s};
   }
-  [[nodiscard]] ClockMap map() const {
-    return {lag_s + (log_start_s - reference_s), drift, reference_s};
-  }
+  [[nodiscard]] ClockMap map() const { return {lag_s + (log_start_s - origin_s), drift, origin_s}; }
   /// The machine's clock since the first reading.
   [[nodiscard]] double since_start_s(double tracker_s) const {
-    const double since_reference_s = tracker_s - reference_s;
-    return since_reference_s + lag_s + drift * since_reference_s;
+    const double since_origin_s = tracker_s - origin_s;
+    return since_origin_s + lag_s + drift * since_origin_s;
   }
 };
 
@@ -87,8 +84,8 @@ class AlongRows {
   /// `clock`: of the log where it is known, otherwise a first estimate.
   AlongRows(const EncoderLog& log, const RunClock& clock);
 
-  /// The observations with the rows of `across` and a third row for each block at constant speed.
-  [[nodiscard]] Observations added_to(const Observations& across, const BlockSeries&,
+  /// The observations with the rows of `across` and a third row for each segment at constant speed.
+  [[nodiscard]] Observations added_to(const Observations& across, const SegmentSeries&,
                                       const Noise&) const;
   [[nodiscard]] std::size_t clock_unknowns() const {
     return log_->known_clock ? 0 : kClockUnknowns;
@@ -99,8 +96,8 @@ class AlongRows {
   /// Factor of the standard uncertainties of the rows.
   [[nodiscard]] double sigma_factor() const { return sigma_factor_; }
   void multiply_sigma(double factor) { sigma_factor_ *= factor; }
-  /// These blocks have no row from now on.
-  void leave_out(std::span<const std::size_t> blocks);
+  /// These segments have no row from now on.
+  void leave_out(std::span<const std::size_t> segments);
   [[nodiscard]] const std::vector<std::size_t>& left_out() const { return left_out_; }
 
  private:
@@ -108,7 +105,7 @@ class AlongRows {
   EncoderLines lines_;
   RunClock clock_;
   double sigma_factor_ = 1.0;
-  std::vector<std::size_t> left_out_;  ///< blocks, ascending
+  std::vector<std::size_t> left_out_;  ///< segments, ascending
 };
 
 }  // namespace abbe::calib::otf

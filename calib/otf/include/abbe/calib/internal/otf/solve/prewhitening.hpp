@@ -1,12 +1,12 @@
 #pragma once
 /// Estimate with correlated noise. Air turbulence and vibration change slowly: the residuals of
-/// consecutive blocks are then correlated, and rows that are weighted as independent ones are
+/// consecutive segments are then correlated, and rows that are weighted as independent ones are
 /// neither used best nor as certain as the adjustment states.
 ///
 /// The noise of the readings of the tracker - range, azimuth, elevation - is white noise and a
 /// slow noise x(t) beside it. x(t) of each reading is a stationary Ornstein-Uhlenbeck process with
 /// the correlation time tau, the same for all readings, and continues from leg to leg and through
-/// gaps. The mean over block i of duration T is m_i; with the stationary variance 1
+/// gaps. The mean over segment i of duration T is m_i; with the stationary variance 1
 ///     Var(m_i) = 2 (T/tau - 1 + exp(-T/tau)) (tau/T)^2
 /// A row sees
 ///     y_i = a_i U + d_i . (s_r m_i,r e_r + s_a rho (m_i,a e_a + m_i,e e_e)) + white noise
@@ -38,11 +38,11 @@ struct TrackerNoise {
   double slow_range_m = 0.0;    ///< s_r
   double slow_angle_rad = 0.0;  ///< s_a
   double slow_along_m = 0.0;    ///< s_t
-  /// tau in s; for blocks without times in units of a block.
+  /// tau in s; for segments without times in units of a segment.
   double correlation_time = 0.0;
 };
 
-/// True if the residuals of consecutive blocks of a leg are correlated, in any direction, with a
+/// True if the residuals of consecutive segments of a leg are correlated, in any direction, with a
 /// coefficient above the 99.9 % quantile of white noise. `residual_m`: one residual per row.
 [[nodiscard]] bool is_correlated(const Observations&, std::span<const double> residual_m);
 

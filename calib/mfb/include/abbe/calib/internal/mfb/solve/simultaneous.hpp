@@ -1,5 +1,6 @@
 #pragma once
-/// The joint adjustment (solve.hpp) in parts that observe, plan and Monte Carlo have in common.
+/// The simultaneous adjustment (solve.hpp) in parts that observe, plan and Monte Carlo have in
+/// common.
 
 #include <vector>
 
@@ -8,12 +9,12 @@
 
 namespace abbe::calib::mfb {
 
-struct JointSystem {
+struct WholeSystem {
   std::vector<NominalTouch> touches;
   SharedUnknowns shared;
   std::vector<PositionSystem> positions;
 };
-[[nodiscard]] Result<JointSystem> joint_system(const Observations&, const NuisanceOptions&);
+[[nodiscard]] Result<WholeSystem> whole_system(const Observations&, const NuisanceOptions&);
 
 /// Estimate of the shared unknowns.
 struct SharedEstimate {
@@ -27,19 +28,19 @@ struct SharedEstimate {
 /// `data` contains the priors of the shared unknowns. Undetermined combinations get a prior of 1 m
 /// or 1 rad, so that their uncertainty is large instead of undefined.
 [[nodiscard]] SharedEstimate estimate_of(estimation::Information data, const SharedUnknowns&);
-[[nodiscard]] SharedEstimate estimate_of(const JointSystem&);
+[[nodiscard]] SharedEstimate estimate_of(const WholeSystem&);
 
 /// The rows of all positions.
-[[nodiscard]] estimation::Information information_of(const JointSystem&);
+[[nodiscard]] estimation::Information information_of(const WholeSystem&);
 
 [[nodiscard]] NuisanceOptions nuisance_options(const SolveOptions&);
-[[nodiscard]] Result<Solution> solve_joint(const Observations&, const NuisanceOptions&);
+[[nodiscard]] Result<Solution> solve_simultaneously(const Observations&, const NuisanceOptions&);
 
-/// Statistics of a joint adjustment; in less time than a solution.
-[[nodiscard]] Result<Statistics> joint_statistics(const Observations&, const NuisanceOptions&);
+/// Statistics of a simultaneous adjustment; in less time than a solution.
+[[nodiscard]] Result<Statistics> whole_statistics(const Observations&, const NuisanceOptions&);
 /// Sum of squares of all whitened residuals, those of the priors included: the value that the
 /// adjustment minimises.
-[[nodiscard]] Result<double> joint_chi2(const Observations&, const NuisanceOptions&);
+[[nodiscard]] Result<double> whole_chi2(const Observations&, const NuisanceOptions&);
 
 /// RankDeficient if an uncertainty exceeds the limits; the text names the errors.
 [[nodiscard]] Result<void> check_shown(const Observations&, const Solution&, const SolveOptions&);

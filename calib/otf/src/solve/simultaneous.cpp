@@ -1,4 +1,4 @@
-#include "abbe/calib/internal/otf/solve/joint.hpp"
+#include "abbe/calib/internal/otf/solve/simultaneous.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/result/try.hpp"
 #include "solve/change_in_u.hpp"
-#include "solve/gauge_of.hpp"
+#include "solve/datum_of.hpp"
 #include "solve/priors.hpp"
 
 namespace abbe::calib::otf {
@@ -63,31 +63,31 @@ class ErrorsOnLeg {
   const Vector3 &from_m_, &to_m_;
 };
 
-void append_block(Observations& o, const Eigen::VectorXd& U, const BlockSeries& series,
-                  std::size_t i, const Noise& noise, std::vector<Vector3>& sub_points_m) {
+void append_segment(Observations& o, const Eigen::VectorXd& U, const SegmentSeries& series,
+                    std::size_t i, const Noise& noise, std::vector<Vector3>& sub_points_m) {
   const std::size_t leg = o.alignment.leg[i];
   const ErrorsOnLeg errors(o, U, leg);
   const RigidTransform& T = o.alignment.T_machine_tracker;
-  const Block& block = series.blocks[i];
+  const Segment& segment = series.segments[i];
 
   sub_points_m.clear();
   for (std::size_t k = 0; k < series.sub_points; ++k) {
-    const Vector3& p = series.sub_points_tracker_m[block.first_sub_point + k];
+    const Vector3& p = series.sub_points_tracker_m[segment.first_sub_point + k];
     sub_points_m.push_back(errors.nominal_m(T * p - o.target_offset_m));
   }
 
-  const Vector3 p_m = T * block.mean_tracker_m - o.target_offset_m;
+  const Vector3 p_m = T * segment.mean_tracker_m - o.target_offset_m;
   const Vector3 c_m = errors.nominal_m(p_m);
   append_rows(
       o,
-      {leg, i, p_m - c_m, c_m, path_frame(errors.travel(c_m), T.R * block.mean_tracker_m, noise),
-       block.effective_samples()},
+      {leg, i, p_m - c_m, c_m, path_frame(errors.travel(c_m), T.R * segment.mean_tracker_m, noise),
+       segment.effective_samples()},
       sub_points_m);
 }
 
 }  // namespace
 
-Observations linearised_at(Observations o, const Eigen::VectorXd& U, const BlockSeries& series,
+Observations linearised_at(Observations o, const Eigen::VectorXd& U, const SegmentSeries& series,
                            const Noise& noise) {
   const Vector6 rigid = U.segment<kRigidUnknowns>(static_cast<Eigen::Index>(o.rigid_offset()));
   const Matrix3 back = small_rotation(-rigid.tail<3>());
@@ -98,21 +98,21 @@ Observations linearised_at(Observations o, const Eigen::VectorXd& U, const Block
   o.rows.clear();
   o.sub_points_m.clear();
   std::vector<Vector3> sub_points_m;
-  for (std::size_t i = 0; i < series.blocks.size(); ++i) {
+  for (std::size_t i = 0; i < series.segments.size(); ++i) {
     if (o.alignment.used[i]) {
-      append_block(o, U, series, i, noise, sub_points_m);
+      append_segment(o, U, series, i, noise, sub_points_m);
     }
   }
 
   return o;
 }
 
-Result<JointObservations> linearise_at_solution(Observations o, const BlockSeries& series,
-                                                const Noise& noise, const Options& options,
-                                                AlongRows* along) {
+Result<ObservationsAtSolution> linearise_at_solution(Observations o, const SegmentSeries& series,
+                                                     const Noise& noise, const Options& options,
+                                                     AlongRows* along) {
   if (o.rows.size() <= o.unknowns()) {
     RowInformation information = information_of(o);
-    return JointObservations{std::move(o), std::move(information), 0};
+    return ObservationsAtSolution{std::move(o), std::move(information), 0};
   }
 
   std::optional<Observations> with_along;
@@ -128,14 +128,14 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
     at.conservativeResizeLike(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.unknowns())));
 
     RowInformation information = information_of(rows);
-    const Result<Eigen::VectorXd> U = gauge_of(rows).estimate(
+    const Result<Eigen::VectorXd> U = datum_of(rows).estimate(
         with_priors(information.data, rows),
-        {.weight = options.gauge_weight, .label = [&](std::size_t i) { return rows.label(i); }});
+        {.weight = options.datum_weight, .label = [&](std::size_t i) { return rows.label(i); }});
     ABBE_TRY(U);
 
     change = change_in_u(*U - at, information.data);
     if (change < options.adjustment_tolerance) {
-      return JointObservations{std::move(rows), std::move(information), adjustments};
+      return ObservationsAtSolution{std::move(rows), std::move(information), adjustments};
     }
 
     o = linearised_at(std::move(o), *U, series, noise);
@@ -147,7 +147,7 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
   }
 
   return failure(ErrorCode::NotConverged,
-                 message("joint adjustment: no convergence after ", options.max_adjustments,
+                 message("simultaneous adjustment: no convergence after ", options.max_adjustments,
                          " adjustments: the last changed the estimate by ", change,
                          " of its standard uncertainty, limit ", options.adjustment_tolerance,
                          "; check that path and points are of the same run"));

@@ -1,7 +1,7 @@
 #pragma once
-/// Blocks of a run and their alignment, without samples that are not of the target on its path.
-/// Samples are excluded in two steps. A run in which no sample is excluded and no block is noisy
-/// has the blocks of make_blocks().
+/// Segments of a run and their alignment, without samples that are not of the target on its path.
+/// Samples are excluded in two steps. A run in which no sample is excluded and no segment is noisy
+/// has the segments of make_segments().
 ///
 /// Before the alignment, unreachable samples: the run is divided where the target would have moved,
 /// from one sample to the next, further than
@@ -12,42 +12,43 @@
 /// limit and have the most samples. If the kept parts do not fit the path, or are less than four
 /// fifths of the run, nothing is excluded in this step.
 ///
-/// After it, samples off the line: a block whose samples deviate in one direction across the travel
-/// by five standard deviations from their median, or whose mean deviates by as much from the means
-/// before and after, is compared, as are its two neighbours, with a straight line over five blocks.
+/// After it, samples off the line: a segment whose samples deviate in one direction across the
+/// travel by five standard deviations from their median, or whose mean deviates by as much from the
+/// means before and after, is compared, as are its two neighbours, with a straight line over five
+/// segments.
 /// The slope of the line is that of repeated medians, from the medians of 15 parts, so that a third
 /// of the samples may be wrong. A sample is excluded if it is off this line by more than
 ///     7 max(1, f, g) sigma
 /// sigma: stated for one sample; f: 1.4826 times the median absolute deviation of the samples from
-/// the median of their block, in units of sigma, median over all blocks; g: the same of the samples
-/// around this line. With normal noise one sample in 4e11 is beyond. In a block in which
+/// the median of their segment, in units of sigma, median over all segments; g: the same of the
+/// samples around this line. With normal noise one sample in 4e11 is beyond. In a segment in which
 /// differences of successive samples have more than three times max(1, f) sigma, this factor
-/// increases the uncertainty of its mean (Block::noise_factor).
+/// increases the uncertainty of its mean (Segment::noise_factor).
 ///
 /// With Options::encoders also samples off the line along the travel: the distance along the leg of
 /// a sample is compared with a line of repeated medians through those of the 14 samples around it
-/// against time, with the same limit. Blocks whose speed differs from that of their leg by more
+/// against time, with the same limit. Segments whose speed differs from that of their leg by more
 /// than 2 % are not looked at.
 ///
-/// Not found: a fault longer than about two blocks that begins and ends within reach; without
+/// Not found: a fault longer than about two segments that begins and ends within reach; without
 /// encoders, errors along the direction of travel.
 
 #include "abbe/calib/otf/observe/alignment.hpp"
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 #include "abbe/calib/otf/samples/nest_visits.hpp"
 
 namespace abbe::calib::otf {
 
-struct AlignedBlocks {
-  BlockSeries series;
+struct AlignedSegments {
+  SegmentSeries series;
   Alignment alignment;
-  NestVisits nests{};  ///< their samples are not in the blocks
+  NestVisits nests{};  ///< their samples are not in the segments
 };
 /// Samples at reference nests (nest_visits.hpp) are taken out before all this. Errors of
-/// find_nest_visits(), make_blocks(), check(Noise) and align(); BadInput if a block travels further
-/// than twice Options::corner_m. Pure.
-[[nodiscard]] Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation>,
-                                                   const Machine&, const Path&, const Noise&,
-                                                   const Options&);
+/// find_nest_visits(), make_segments(), check(Noise) and align(); BadInput if a segment travels
+/// further than twice Options::corner_m. Pure.
+[[nodiscard]] Result<AlignedSegments> aligned_segments(std::span<const TrackerObservation>,
+                                                       const Machine&, const Path&, const Noise&,
+                                                       const Options&);
 
 }  // namespace abbe::calib::otf

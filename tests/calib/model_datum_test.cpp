@@ -1,4 +1,4 @@
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 
 #include <gtest/gtest.h>
 
@@ -108,8 +108,8 @@ TEST_P(Nullity, IsSpannedByTheUnobservableCombinations) {
   EXPECT_LT(seen.norm(), 1e-11 * N.norm());
 }
 
-TEST_P(Nullity, IsRemovedExactlyByGaugeG1) {
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, one_target_);
+TEST_P(Nullity, IsRemovedExactlyByDatumG1) {
+  const Eigen::MatrixXd K = datum_conditions(ModelDatum::G1, one_target_);
   EXPECT_EQ(K.rows(), 20);
   const Eigen::MatrixXd KN =
       K * unobservable_combinations(one_target_, std::array{kTarget}).colwise().normalized();
@@ -119,7 +119,7 @@ TEST_P(Nullity, IsRemovedExactlyByGaugeG1) {
 
 /// Nodes computed from range and spacing are rounded: a node 1e-17 m from the reference is at the
 /// reference.
-TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
+TEST(DatumG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
   std::size_t beside = 0;
   for (int half_mm = 10; half_mm <= 1500; half_mm += 10) {
     for (const int spacing_mm : {10, 15, 20, 25, 30, 40, 45, 50, 60, 75, 100, 150}) {
@@ -133,7 +133,7 @@ TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
                               [](double x) { return x != 0.0 && std::abs(x) < 1e-12; });
         const ParameterLayout layout = *ParameterLayout::with_tables(
             machine.chain, machine.nodes, std::array{ErrorMotion{Motion::X, Axis::X}});
-        const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, layout);
+        const Eigen::MatrixXd K = datum_conditions(ModelDatum::G1, layout);
         ASSERT_EQ((K.array() != 0.0).count(), at_node ? 1 : 2)
             << low_mm << " to " << half_mm << " every " << spacing_mm;
       }
@@ -143,21 +143,22 @@ TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
   EXPECT_GT(beside, 50u);  // the ranges that this test checks
 }
 
-TEST(GaugeG1, Has24ConditionsFor18Tables) {
+TEST(DatumG1, Has24ConditionsFor18Tables) {
   const otf::Machine machine = case_a_machine();
-  EXPECT_EQ(gauge_conditions(Gauge::G1, *ParameterLayout::all_tables(machine.chain, machine.nodes))
-                .rows(),
-            24);
+  EXPECT_EQ(
+      datum_conditions(ModelDatum::G1, *ParameterLayout::all_tables(machine.chain, machine.nodes))
+          .rows(),
+      24);
 }
 
-TEST(GaugeG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
+TEST(DatumG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
   const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
   const ParameterLayout layout = layout_of(machine);
   std::mt19937_64 random(5);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   U.head(static_cast<Eigen::Index>(layout.model_size())) = random_tables(layout, 1e-4, random);
-  const Eigen::VectorXd G1 = *to_gauge(Gauge::G1, layout, std::array{kTarget}, U);
-  EXPECT_LT((gauge_conditions(Gauge::G1, layout) * G1).norm(), 1e-15);
+  const Eigen::VectorXd G1 = *to_datum(ModelDatum::G1, layout, std::array{kTarget}, U);
+  EXPECT_LT((datum_conditions(ModelDatum::G1, layout) * G1).norm(), 1e-15);
   const DesignColumns design = design_columns_with_rigid(layout, Vector3(0.2, 0.1, -0.05), kTarget);
   Vector3 change = Vector3::Zero();
 
@@ -169,16 +170,16 @@ TEST(GaugeG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
 }
 
 /// 18 tables, three tools: combinations that a single tool leaves undetermined do not change.
-TEST(GaugeG1, ConversionOf18TablesKeepsWhatEveryToolMeasures) {
+TEST(DatumG1, ConversionOf18TablesKeepsWhatEveryToolMeasures) {
   const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
   const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);
   std::mt19937_64 random(5);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   U.head(n) = random_tables(layout, 1e-4, random);
-  const Result<Eigen::VectorXd> G1 = to_gauge(Gauge::G1, layout, kThreeTargets, U);
+  const Result<Eigen::VectorXd> G1 = to_datum(ModelDatum::G1, layout, kThreeTargets, U);
   ASSERT_TRUE(G1) << G1.error().text;
-  EXPECT_LT((gauge_conditions(Gauge::G1, layout) * *G1).norm(), 1e-15);
+  EXPECT_LT((datum_conditions(ModelDatum::G1, layout) * *G1).norm(), 1e-15);
   const Eigen::VectorXd moved = *G1 - U;
 
   for (const Vector3& t : {kThreeTargets[1], Vector3(0.3, -0.2, 0.1)}) {
@@ -191,7 +192,7 @@ TEST(GaugeG1, ConversionOf18TablesKeepsWhatEveryToolMeasures) {
   }
 }
 
-TEST(GaugeG1, Of18TablesNeedsThreeToolsThatAreNotOnALine) {
+TEST(DatumG1, Of18TablesNeedsThreeToolsThatAreNotOnALine) {
   const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
   const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);
   const Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
@@ -199,18 +200,18 @@ TEST(GaugeG1, Of18TablesNeedsThreeToolsThatAreNotOnALine) {
   for (const auto& tools :
        {std::vector{kTarget}, std::vector{kTarget, Vector3(kTarget + step)},
         std::vector{kTarget, Vector3(kTarget + step), Vector3(kTarget - step)}}) {
-    const Result<Eigen::VectorXd> G1 = to_gauge(Gauge::G1, layout, tools, U);
+    const Result<Eigen::VectorXd> G1 = to_datum(ModelDatum::G1, layout, tools, U);
     ASSERT_FALSE(G1) << tools.size();
     EXPECT_EQ(G1.error().code, ErrorCode::DegenerateGeometry);
   }
 }
 
-TEST(GaugeG1, LeavesTheReferenceTablesAsTheyAre) {
+TEST(DatumG1, LeavesTheReferenceTablesAsTheyAre) {
   const otf::Machine machine = case_a_machine();
   const ParameterLayout layout = layout_of(machine);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   U.head(163) = case_a_tables(TableColumn::Truth);
-  EXPECT_LT((gauge_conditions(Gauge::G1, layout) * U).cwiseAbs().maxCoeff(), 1e-15);
+  EXPECT_LT((datum_conditions(ModelDatum::G1, layout) * U).cwiseAbs().maxCoeff(), 1e-15);
 }
 
 /// A machine whose axes are far from machine zero.
@@ -223,19 +224,20 @@ otf::Machine machine_far_from_zero() {
   return machine;
 }
 
-VolumetricModel model_in(Gauge gauge, const otf::Machine& machine, const Eigen::VectorXd& U) {
+VolumetricModel model_in(ModelDatum datum, const otf::Machine& machine, const Eigen::VectorXd& U) {
   const ParameterLayout layout = layout_of(machine);
-  return *VolumetricModel::from_vector(layout, gauge, std::array{machine.target_offset_m}, U,
+  return *VolumetricModel::from_vector(layout, datum, std::array{machine.target_offset_m}, U,
                                        1e-14 * Eigen::MatrixXd::Identity(U.size(), U.size()),
                                        *ValidityVolume::hull_of(tensor_grid(machine.nodes)));
 }
 
-TEST(GaugeG2, SquarenessActsOnTheDistanceFromTheReferencePosition) {
+TEST(DatumG2, SquarenessActsOnTheDistanceFromTheReferencePosition) {
   const otf::Machine machine = machine_far_from_zero();
   const ParameterLayout layout = layout_of(machine);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.model_size()));
   U.tail<3>() = Vector3(20e-6, -30e-6, 40e-6);
-  const VolumetricModel G1 = model_in(Gauge::G1, machine, U), G2 = model_in(Gauge::G2, machine, U);
+  const VolumetricModel G1 = model_in(ModelDatum::G1, machine, U),
+                        G2 = model_in(ModelDatum::G2, machine, U);
   const Vector3 reference_m = Vector3::Constant(3.0), t = machine.target_offset_m;
   EXPECT_EQ(G2.V_at(reference_m, t), Vector3(Vector3::Zero()));
   EXPECT_LT(std::sqrt(G2.error_at(reference_m, t).cov_V_m2.trace()), 1e-6);
@@ -248,16 +250,16 @@ TEST(GaugeG2, SquarenessActsOnTheDistanceFromTheReferencePosition) {
   }
 }
 
-TEST(GaugeG2, AStoredModelKeepsItsGauge) {
+TEST(DatumG2, AStoredModelKeepsItsDatum) {
   const otf::Machine machine = machine_far_from_zero();
   const ParameterLayout layout = layout_of(machine);
   const Eigen::VectorXd U =
       Eigen::VectorXd::Constant(static_cast<Eigen::Index>(layout.model_size()), 1e-5);
   const Vector3 q_m(2.9, 3.1, 3.0);
-  for (const Gauge gauge : {Gauge::G1, Gauge::G2}) {
-    const VolumetricModel model = model_in(gauge, machine, U);
+  for (const ModelDatum datum : {ModelDatum::G1, ModelDatum::G2}) {
+    const VolumetricModel model = model_in(datum, machine, U);
     const VolumetricModel read = *VolumetricModel::from_description(model.description());
-    EXPECT_EQ(read.gauge(), gauge);
+    EXPECT_EQ(read.datum(), datum);
     EXPECT_EQ(read.V_at(q_m, machine.target_offset_m), model.V_at(q_m, machine.target_offset_m));
   }
 }

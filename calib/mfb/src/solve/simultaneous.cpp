@@ -1,4 +1,4 @@
-#include "abbe/calib/internal/mfb/solve/joint.hpp"
+#include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -27,7 +27,7 @@ double least_diagonal(const RowMajorRows& R, const Eigen::VectorXd& lengths) {
 
 /// Degrees of freedom: observations less the trace of the hat matrix. A prior with the posterior
 /// standard uncertainty u' of an unknown takes (u'/u)^2 of it.
-double trace_of_hat_matrix(const JointSystem& system, const SharedEstimate& estimate) {
+double trace_of_hat_matrix(const WholeSystem& system, const SharedEstimate& estimate) {
   double trace = static_cast<double>(system.shared.size());
   for (Eigen::Index k = system.shared.bar_offset(); k < system.shared.size(); ++k) {
     trace -= estimate.covariance(k, k);
@@ -44,7 +44,7 @@ double trace_of_hat_matrix(const JointSystem& system, const SharedEstimate& esti
   return trace - static_cast<double>(estimate.defect);
 }
 
-std::size_t priors_of(const JointSystem& system) {
+std::size_t priors_of(const WholeSystem& system) {
   auto priors = static_cast<std::size_t>(system.shared.size() - system.shared.bar_offset());
   for (const PositionSystem& s : system.positions) {
     priors += static_cast<std::size_t>(std::count_if(s.layout.u.begin(), s.layout.u.end(),
@@ -53,7 +53,7 @@ std::size_t priors_of(const JointSystem& system) {
   return priors;
 }
 
-void set_statistics(Solution& solution, const JointSystem& system, const SharedEstimate& estimate) {
+void set_statistics(Solution& solution, const WholeSystem& system, const SharedEstimate& estimate) {
   Statistics& s = solution.statistics;
   s.unknowns = static_cast<std::size_t>(system.shared.size());
   for (const PositionSystem& position : system.positions) {
@@ -83,8 +83,8 @@ void set_statistics(Solution& solution, const JointSystem& system, const SharedE
 
 }  // namespace
 
-Result<JointSystem> joint_system(const Observations& o, const NuisanceOptions& options) {
-  JointSystem system{nominal_touches(o.bar.pattern, o.plan.tip_radius_m), SharedUnknowns(o), {}};
+Result<WholeSystem> whole_system(const Observations& o, const NuisanceOptions& options) {
+  WholeSystem system{nominal_touches(o.bar.pattern, o.plan.tip_radius_m), SharedUnknowns(o), {}};
   for (std::size_t i = 0; i < o.positions.size(); ++i) {
     Result<PositionSystem> position = position_system(o, i, system.shared, options);
     ABBE_TRY(position);
@@ -93,7 +93,7 @@ Result<JointSystem> joint_system(const Observations& o, const NuisanceOptions& o
   return system;
 }
 
-estimation::Information information_of(const JointSystem& system) {
+estimation::Information information_of(const WholeSystem& system) {
   estimation::Information data(static_cast<std::size_t>(system.shared.size()));
   add_shared_priors(data, system.shared);
   for (const PositionSystem& position : system.positions) {
@@ -124,7 +124,7 @@ SharedEstimate estimate_of(estimation::Information data, const SharedUnknowns& s
   return estimate;
 }
 
-SharedEstimate estimate_of(const JointSystem& system) {
+SharedEstimate estimate_of(const WholeSystem& system) {
   return estimate_of(information_of(system), system.shared);
 }
 
@@ -132,8 +132,8 @@ NuisanceOptions nuisance_options(const SolveOptions& options) {
   return {.u_roll_rad = options.u_roll_rad};
 }
 
-Result<Statistics> joint_statistics(const Observations& o, const NuisanceOptions& options) {
-  return joint_system(o, options).map([&](const JointSystem& system) {
+Result<Statistics> whole_statistics(const Observations& o, const NuisanceOptions& options) {
+  return whole_system(o, options).map([&](const WholeSystem& system) {
     const SharedEstimate estimate = estimate_of(system);
     Solution solution;
     set_residuals(solution, o, system, estimate);
@@ -142,14 +142,14 @@ Result<Statistics> joint_statistics(const Observations& o, const NuisanceOptions
   });
 }
 
-Result<double> joint_chi2(const Observations& o, const NuisanceOptions& options) {
-  return joint_system(o, options).map([](const JointSystem& system) {
+Result<double> whole_chi2(const Observations& o, const NuisanceOptions& options) {
+  return whole_system(o, options).map([](const WholeSystem& system) {
     return information_of(system).rest();
   });
 }
 
-Result<Solution> solve_joint(const Observations& o, const NuisanceOptions& options) {
-  const Result<JointSystem> system = joint_system(o, options);
+Result<Solution> solve_simultaneously(const Observations& o, const NuisanceOptions& options) {
+  const Result<WholeSystem> system = whole_system(o, options);
   ABBE_TRY(system);
   const SharedEstimate estimate = estimate_of(*system);
   const SharedUnknowns& shared = system->shared;

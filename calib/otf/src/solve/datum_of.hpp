@@ -5,7 +5,7 @@
 
 namespace abbe::calib::otf {
 
-/// The conditions of gauge G2 (gauge.hpp) as a Datum for the unknowns of the observations.
-[[nodiscard]] estimation::Datum gauge_of(const Observations&);
+/// The conditions of datum G2 (model_datum.hpp) as a Datum for the unknowns of the observations.
+[[nodiscard]] estimation::Datum datum_of(const Observations&);
 
 }  // namespace abbe::calib::otf

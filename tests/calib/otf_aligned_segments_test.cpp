@@ -1,4 +1,4 @@
-#include "abbe/calib/internal/otf/observe/aligned_blocks.hpp"
+#include "abbe/calib/internal/otf/observe/aligned_segments.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,13 +25,13 @@ using testing::HasSubstr;
 constexpr double kOutlier_m = 0.2e-3;
 
 MadeRun noisy_run(unsigned seed) {
-  MadeRun run = make_run({.seed = seed, .noise_seed = seed, .in_gauge = true});
-  run.options.estimator = Estimator::Joint;
+  MadeRun run = make_run({.seed = seed, .noise_seed = seed, .in_datum = true});
+  run.options.estimator = Estimator::Simultaneous;
   return run;
 }
 
-Result<AlignedBlocks> aligned_blocks_of(const MadeRun& run) {
-  return aligned_blocks(run.samples, run.machine, run.path, run.noise, run.options);
+Result<AlignedSegments> aligned_segments_of(const MadeRun& run) {
+  return aligned_segments(run.samples, run.machine, run.path, run.noise, run.options);
 }
 
 Result<Identification> identified_run(const MadeRun& run) {
@@ -55,7 +55,7 @@ double mean_error_of_tables_m(const MadeRun& run, const VolumetricModel& model) 
   return rigid_free(points, errors_left(run, model))->rigid_free.mean_m;
 }
 
-/// Mean of (error / u)^2 over the parameters that the gauge does not fix.
+/// Mean of (error / u)^2 over the parameters that the datum does not fix.
 double mean_squared_normalised(const MadeRun& run, const VolumetricModel& model) {
   double sum = 0.0;
   int count = 0;
@@ -74,24 +74,24 @@ Verdict verdict_of(const MadeRun& run, const Identification& id) {
   return *judge(id.observations, id.solution, nullptr, {}, run.options);
 }
 
-TEST(AlignedBlocks, AreThoseOfAllSamplesInASoundRun) {
+TEST(AlignedSegments, AreThoseOfAllSamplesInASoundRun) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     const MadeRun run = noisy_run(seed);
-    const auto robust = aligned_blocks_of(run);
-    const auto all = make_blocks(run.samples, run.options);
+    const auto robust = aligned_segments_of(run);
+    const auto all = make_segments(run.samples, run.options);
     ASSERT_TRUE(robust && all);
     EXPECT_FALSE(robust->series.set_aside.any());
-    const auto as_before = identify_blocks(*all, run.machine, run.path, run.noise, run.options);
+    const auto as_before = identify_segments(*all, run.machine, run.path, run.noise, run.options);
     EXPECT_EQ(identified_clean(seed).solution.model.U(), as_before->solution.model.U());
   }
 }
 
-TEST(AlignedBlocks, SetNothingAsideWithoutNoise) {
-  EXPECT_FALSE(aligned_blocks_of(make_run({.noise_factor = 0.0}))->series.set_aside.any());
+TEST(AlignedSegments, SetNothingAsideWithoutNoise) {
+  EXPECT_FALSE(aligned_segments_of(make_run({.noise_factor = 0.0}))->series.set_aside.any());
 }
 
-TEST(AlignedBlocks, SetNothingAsideWithFiveTimesTheStatedNoise) {
-  EXPECT_FALSE(aligned_blocks_of(make_run({.noise_factor = 5.0}))->series.set_aside.any());
+TEST(AlignedSegments, SetNothingAsideWithFiveTimesTheStatedNoise) {
+  EXPECT_FALSE(aligned_segments_of(make_run({.noise_factor = 5.0}))->series.set_aside.any());
 }
 
 struct StreamFault {
@@ -130,7 +130,7 @@ TEST_P(FaultOfStream, HardlyChangesTheModel) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    AlignedBlocks, FaultOfStream,
+    AlignedSegments, FaultOfStream,
     testing::Values(
         StreamFault{"outliers of 1 %",
                     [](Stream& s, auto& r) { add_outliers(s, 0.01, kOutlier_m, r); }},
@@ -150,55 +150,55 @@ INSTANTIATE_TEST_SUITE_P(
         StreamFault{"another reflector for 5 s",
                     [](Stream& s, auto& r) { add_other_target(s, 5.0, 0.0, 0.3, r); }}));
 
-TEST(AlignedBlocks, CountWhatIsSetAside) {
+TEST(AlignedSegments, CountWhatIsSetAside) {
   MadeRun run = noisy_run(1);
   for (const std::size_t i : {5000U, 5001U, 5002U, 9000U}) {
     run.samples[i].p_tracker_m += Vector3(0.3e-3, 0.3e-3, 0.3e-3);
   }
   run.samples[7000].p_tracker_m = Vector3::Zero();
-  const SetAside aside = aligned_blocks_of(run)->series.set_aside;
+  const SetAside aside = aligned_segments_of(run)->series.set_aside;
   EXPECT_EQ(aside.off_line, 4U);
   EXPECT_EQ(aside.unreachable, 1U);
   EXPECT_EQ(aside.longest, 3U);
   EXPECT_NEAR(aside.longest_from_s, run.samples[5000].time_s, 1e-9);
   EXPECT_EQ(aside.of_samples, run.samples.size());
-  EXPECT_EQ(aligned_blocks_of(run)->series.lost_samples, 0U);
+  EXPECT_EQ(aligned_segments_of(run)->series.lost_samples, 0U);
   EXPECT_THAT(verdict_of(run, *identified_run(run)).notes, Contains(HasSubstr("5 samples (")));
 }
 
 // Samples at the vertices are in no row; they must not confuse alignment and legs.
-TEST(AlignedBlocks, OutliersAtTheVerticesChangeNothing) {
+TEST(AlignedSegments, OutliersAtTheVerticesChangeNothing) {
   MadeRun run = noisy_run(2);
   const double clean_m = mean_error_of_tables_m(run, identified_clean(2).solution.model);
   std::mt19937_64 random(1);
-  const auto aligned = aligned_blocks_of(run);
-  for (std::size_t b = 0; b < aligned->series.blocks.size(); ++b) {
-    const Block& block = aligned->series.blocks[b];
+  const auto aligned = aligned_segments_of(run);
+  for (std::size_t b = 0; b < aligned->series.segments.size(); ++b) {
+    const Segment& segment = aligned->series.segments[b];
     if (!aligned->alignment.used[b]) {
-      run.samples[block.begin_sample].p_tracker_m += normal_vector(0.1, random);
+      run.samples[segment.begin_sample].p_tracker_m += normal_vector(0.1, random);
     }
   }
   EXPECT_LT(mean_error_of_tables_m(run, identified_run(run)->solution.model), 1.02 * clean_m);
 }
 
-TEST(AlignedBlocks, GiveALegOfBadSamplesLittleWeight) {
+TEST(AlignedSegments, GiveALegOfBadSamplesLittleWeight) {
   MadeRun run = noisy_run(3);
   const double clean_m = mean_error_of_tables_m(run, identified_clean(3).solution.model);
   std::mt19937_64 random(1);
-  const auto aligned = aligned_blocks_of(run);
-  for (std::size_t b = 0; b < aligned->series.blocks.size(); ++b) {
-    const Block& block = aligned->series.blocks[b];
-    for (std::size_t i = block.begin_sample;
-         aligned->alignment.leg[b] == 30 && i < block.end_sample; ++i) {
+  const auto aligned = aligned_segments_of(run);
+  for (std::size_t b = 0; b < aligned->series.segments.size(); ++b) {
+    const Segment& segment = aligned->series.segments[b];
+    for (std::size_t i = segment.begin_sample;
+         aligned->alignment.leg[b] == 30 && i < segment.end_sample; ++i) {
       run.samples[i].p_tracker_m += normal_vector(kOutlier_m, random);
     }
   }
   const auto found = identified_run(run);
-  EXPECT_GT(found->observations.set_aside.noisy_blocks, 5U);
+  EXPECT_GT(found->observations.set_aside.noisy_segments, 5U);
   EXPECT_LT(mean_error_of_tables_m(run, found->solution.model), 1.3 * clean_m);
 }
 
-TEST(AlignedBlocks, RefuseAReflectorWithinReachOfABreakOrSetItAside) {
+TEST(AlignedSegments, RefuseAReflectorWithinReachOfABreakOrSetItAside) {
   MadeRun run = noisy_run(1);
   const double clean_m = mean_error_of_tables_m(run, identified_clean(1).solution.model);
   std::mt19937_64 random(4);
@@ -209,7 +209,7 @@ TEST(AlignedBlocks, RefuseAReflectorWithinReachOfABreakOrSetItAside) {
   }
 }
 
-TEST(AlignedBlocks, RefuseARunWithAQuarterOfOutliers) {
+TEST(AlignedSegments, RefuseARunWithAQuarterOfOutliers) {
   MadeRun run = noisy_run(1);
   std::mt19937_64 random(5);
   add_outliers(run.samples, 0.25, kOutlier_m, random);
@@ -219,19 +219,19 @@ TEST(AlignedBlocks, RefuseARunWithAQuarterOfOutliers) {
 }
 
 /// Samples that the tracker does not report are no part of the share.
-TEST(AlignedBlocks, CountTheShareWithoutMissingSamples) {
+TEST(AlignedSegments, CountTheShareWithoutMissingSamples) {
   MadeRun run = noisy_run(1);
   std::mt19937_64 random(6);
   add_outliers(run.samples, 0.05, kOutlier_m, random);
   const auto begin = run.samples.begin() + 4000;
   run.samples.erase(begin, begin + 100);
-  const auto aligned = aligned_blocks_of(run);
+  const auto aligned = aligned_segments_of(run);
   ASSERT_TRUE(aligned) << aligned.error().text;
   EXPECT_GE(aligned->series.lost_samples, 100U);
   EXPECT_EQ(aligned->series.set_aside.of_samples, run.samples.size());
 }
 
-TEST(AlignedBlocks, NameARangeThatChangedAtABreak) {
+TEST(AlignedSegments, NameARangeThatChangedAtABreak) {
   MadeRun run = noisy_run(1);
   change_between(run.samples, 30.0, 1.0, [](auto& s) { s.valid = false; });
   change_between(run.samples, 70.0, 1.0, [](auto& s) { s.valid = false; });

@@ -1,14 +1,14 @@
-#include "abbe/calib/internal/model/gauge_coordinates.hpp"
+#include "abbe/calib/internal/model/datum_coordinates.hpp"
 
 #include <Eigen/QR>
 
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 
 namespace abbe::calib {
 namespace {
 
-std::vector<GaugeGroup> groups_of(const ParameterLayout& layout) {
-  std::vector<GaugeGroup> groups;
+std::vector<DatumGroup> groups_of(const ParameterLayout& layout) {
+  std::vector<DatumGroup> groups;
   for (const Table& table : layout.tables()) {
     groups.push_back({.name = name(table.motion),
                       .motion = table.motion,
@@ -44,25 +44,25 @@ Eigen::MatrixXd free_of(const Eigen::MatrixXd& K) {
 
 }  // namespace
 
-Eigen::MatrixXd GaugeCoordinates::of_group(const GaugeGroup& group,
+Eigen::MatrixXd DatumCoordinates::of_group(const DatumGroup& group,
                                            const Eigen::MatrixXd& matrix) const {
   return N.block(group.offset, group.first, group.count, group.size).transpose() *
          matrix.middleRows(group.offset, group.count);
 }
 
-bool is_in_gauge(const GaugeCoordinates& c, const Eigen::MatrixXd& covariance) {
+bool is_in_datum(const DatumCoordinates& c, const Eigen::MatrixXd& covariance) {
   constexpr double kRounding = 1e-6;
   const double all = covariance.trace();
-  const double in_gauge = (covariance * c.N).cwiseProduct(c.N).sum();
-  return all - in_gauge <= kRounding * all;
+  const double in_datum = (covariance * c.N).cwiseProduct(c.N).sum();
+  return all - in_datum <= kRounding * all;
 }
 
-GaugeCoordinates gauge_coordinates(const TableBasis& basis) {
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G2, basis, basis.size());
-  GaugeCoordinates c{.N = {}, .groups = groups_of(basis.layout())};
+DatumCoordinates datum_coordinates(const TableBasis& basis) {
+  const Eigen::MatrixXd K = datum_conditions(ModelDatum::G2, basis, basis.size());
+  DatumCoordinates c{.N = {}, .groups = groups_of(basis.layout())};
   std::vector<Eigen::MatrixXd> parts;
   Eigen::Index size = 0;
-  for (GaugeGroup& group : c.groups) {
+  for (DatumGroup& group : c.groups) {
     parts.push_back(free_of(K.middleCols(group.offset, group.count)));
     group.first = size;
     group.size = parts.back().cols();
@@ -71,14 +71,14 @@ GaugeCoordinates gauge_coordinates(const TableBasis& basis) {
 
   c.N = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(basis.size()), size);
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    const GaugeGroup& group = c.groups[i];
+    const DatumGroup& group = c.groups[i];
     c.N.block(group.offset, group.first, group.count, group.size) = parts[i];
   }
 
   return c;
 }
 
-Eigen::VectorXd smooth_change(const GaugeGroup& group, const ParameterLayout& layout) {
+Eigen::VectorXd smooth_change(const DatumGroup& group, const ParameterLayout& layout) {
   Eigen::VectorXd shape = Eigen::VectorXd::Ones(group.count);
   if (!group.motion) {
     return shape;

@@ -1,8 +1,8 @@
 #pragma once
 /// What `observe` of a method yields: observations that share noise and nuisances,
 ///     y = A U + L c + noise,   c ~ N(0, diag u^2),   noise ~ N(0, C)
-/// U: unknowns that other blocks share (parameters of the model, scale of an instrument, artefact),
-/// c: nuisances of this block alone (pose, offset, clock).
+/// U: unknowns that other groups share (parameters of the model, scale of an instrument, artefact),
+/// c: nuisances of this group alone (pose, offset, clock).
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace abbe::calib::estimation {
 /// A nuisance without a prior.
 inline constexpr double kNoPrior = std::numeric_limits<double>::infinity();
 
-struct Block {
+struct ObservationGroup {
   std::vector<std::size_t> unknowns;  ///< index in U of each column of A
   Eigen::MatrixXd A;                  ///< rows x unknowns.size()
   Eigen::MatrixXd L{};                ///< rows x nuisances; without columns: no nuisances

@@ -1,4 +1,4 @@
-#include "abbe/calib/model/gauge.hpp"
+#include "abbe/calib/model/model_datum.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -76,7 +76,7 @@ void add_complete_data(estimation::Information& data, const ParameterLayout& lay
 
 }  // namespace
 
-Eigen::MatrixXd gauge_conditions(Gauge, const TableBasis& basis, std::size_t unknowns) {
+Eigen::MatrixXd datum_conditions(ModelDatum, const TableBasis& basis, std::size_t unknowns) {
   std::vector<Condition> conditions;
   for (const Table& table : basis.layout().tables()) {
     const AxisNodes& axis = basis.layout().nodes()[index(table.motion.axis)];
@@ -96,8 +96,8 @@ Eigen::MatrixXd gauge_conditions(Gauge, const TableBasis& basis, std::size_t unk
   return K;
 }
 
-Eigen::MatrixXd gauge_conditions(Gauge gauge, const ParameterLayout& layout) {
-  return gauge_conditions(gauge, linear_basis(layout), layout.fit_size());
+Eigen::MatrixXd datum_conditions(ModelDatum datum, const ParameterLayout& layout) {
+  return datum_conditions(datum, linear_basis(layout), layout.fit_size());
 }
 
 Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout,
@@ -110,15 +110,15 @@ Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout,
   return estimation::null_space(data).basis.topRows(static_cast<Eigen::Index>(layout.fit_size()));
 }
 
-Result<Eigen::VectorXd> to_gauge(Gauge gauge, const ParameterLayout& layout,
+Result<Eigen::VectorXd> to_datum(ModelDatum datum, const ParameterLayout& layout,
                                  std::span<const Vector3> targets_m, const Eigen::VectorXd& U) {
   const Eigen::MatrixXd N = unobservable_combinations(layout, targets_m);
-  const Eigen::MatrixXd K = gauge_conditions(gauge, layout);
+  const Eigen::MatrixXd K = datum_conditions(datum, layout);
   if (N.cols() > K.rows()) {
     return failure(
         ErrorCode::DegenerateGeometry,
-        message("gauge: ", targets_m.size(), " tool offsets leave ", N.cols(), " combinations of ",
-                layout.tables().size(), " tables undetermined, the gauge fixes ", K.rows(),
+        message("datum: ", targets_m.size(), " tool offsets leave ", N.cols(), " combinations of ",
+                layout.tables().size(), " tables undetermined, the datum fixes ", K.rows(),
                 "; 18 tables need three offsets that are not on a line"));
   }
   return estimation::Datum(K).transformation(N).map(

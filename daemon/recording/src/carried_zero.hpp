@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "abbe/messages/recording_info.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 #include "abbe/pipeline/counting_state.hpp"
-#include "abbe/pipeline/datum.hpp"
 
 namespace abbe::daemon::recording {
 
@@ -19,25 +19,25 @@ struct TimedAttachment {
 };
 
 /// Whether the next file needs the attachment. Call it for the attachments of a file from the
-/// newest to the oldest. `settled`: mask of the axes whose earlier datums are not valid any more;
+/// newest to the oldest. `settled`: mask of the axes whose earlier zeros are not valid any more;
 /// updated by the call.
-inline bool is_carried_on(const RecordingAttachment& attachment, const DatumState& state,
+inline bool is_carried_on(const RecordingAttachment& attachment, const ZeroState& state,
                           std::uint32_t& settled) {
-  if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName ||
+  if (attachment.name == kReferenceRequestName || attachment.name == kZeroStateName ||
       attachment.name == kCountingStateName)
     return false;
-  if (attachment.name != kDatumName) return true;
-  const auto datum = datum_from_attachment(attachment);
-  if (!datum || datum->from >= state.at) return true;
-  const std::uint32_t axis = 1u << datum->axis;
+  if (attachment.name != kZeroName) return true;
+  const auto zero = zero_from_attachment(attachment);
+  if (!zero || zero->from >= state.at) return true;
+  const std::uint32_t axis = 1u << zero->axis;
   const bool valid = (settled & axis) == 0;
   settled |= axis;
   return valid;
 }
 
-/// Keeps the valid datum of every axis and the datums found since `state`, and adds `state`, which
+/// Keeps the valid zero of every axis and the zeros found since `state`, and adds `state`, which
 /// lists the axes that are not referenced.
-inline void carry_datum_on(std::vector<TimedAttachment>& attachments, const DatumState& state,
+inline void carry_zeros_on(std::vector<TimedAttachment>& attachments, const ZeroState& state,
                            std::uint64_t state_time_ns) {
   std::uint32_t settled = state.unknown;
   std::vector<TimedAttachment> carried;

@@ -1,4 +1,4 @@
-#include "abbe/calib/internal/otf/observe/aligned_blocks.hpp"
+#include "abbe/calib/internal/otf/observe/aligned_segments.hpp"
 
 #include <algorithm>
 #include <string>
@@ -28,7 +28,7 @@ KeptSamples without_aside(std::span<const TrackerObservation> samples,
 
 /// Adds where samples are excluded.
 void add_places(SetAside& a, std::span<const TrackerObservation> samples,
-                const std::vector<bool>& aside, const AlignedBlocks& run) {
+                const std::vector<bool>& aside, const AlignedSegments& run) {
   std::size_t in_a_row = 0;
   for (std::size_t i = 0; i < aside.size(); ++i) {
     in_a_row = aside[i] ? in_a_row + 1 : 0;
@@ -39,11 +39,11 @@ void add_places(SetAside& a, std::span<const TrackerObservation> samples,
   }
 
   std::vector<std::size_t> on_leg(run.alignment.leg.back() + 1, 0);
-  for (std::size_t b = 0; b < run.series.blocks.size(); ++b) {
-    const Block& block = run.series.blocks[b];
+  for (std::size_t b = 0; b < run.series.segments.size(); ++b) {
+    const Segment& segment = run.series.segments[b];
     on_leg[run.alignment.leg[b]] += static_cast<std::size_t>(
-        std::count(aside.begin() + static_cast<std::ptrdiff_t>(block.begin_sample),
-                   aside.begin() + static_cast<std::ptrdiff_t>(block.end_sample), true));
+        std::count(aside.begin() + static_cast<std::ptrdiff_t>(segment.begin_sample),
+                   aside.begin() + static_cast<std::ptrdiff_t>(segment.end_sample), true));
   }
   const auto worst = std::max_element(on_leg.begin(), on_leg.end());
   a.worst_leg = static_cast<std::size_t>(worst - on_leg.begin());
@@ -60,20 +60,20 @@ class Screening {
             const Noise& noise, const Options& options)
       : samples_(samples), machine_(machine), path_(path), noise_(noise), options_(options) {}
 
-  [[nodiscard]] Result<AlignedBlocks> blocks() {
-    return make_blocks(samples_, options_)
-        .and_then([&](BlockSeries all) { return without_unreachable(std::move(all)); })
-        .and_then([&](AlignedBlocks run) { return without_off_line(std::move(run)); });
+  [[nodiscard]] Result<AlignedSegments> segments() {
+    return make_segments(samples_, options_)
+        .and_then([&](SegmentSeries all) { return without_unreachable(std::move(all)); })
+        .and_then([&](AlignedSegments run) { return without_off_line(std::move(run)); });
   }
 
  private:
-  Result<AlignedBlocks> without_unreachable(BlockSeries all) {
+  Result<AlignedSegments> without_unreachable(SegmentSeries all) {
     aside_ = unreachable_samples(samples_);
     if (aside_.empty()) {
       return aligned(std::move(all));
     }
 
-    Result<AlignedBlocks> run = aligned_without_aside();
+    Result<AlignedSegments> run = aligned_without_aside();
     if (!run) {
       aside_.clear();
       return aligned(std::move(all));
@@ -82,7 +82,7 @@ class Screening {
     return run;
   }
 
-  Result<AlignedBlocks> without_off_line(AlignedBlocks run) {
+  Result<AlignedSegments> without_off_line(AlignedSegments run) {
     const KeptSamples reachable = aside_.empty() ? KeptSamples{} : without_aside(samples_, aside_);
     const std::span<const TrackerObservation> kept =
         aside_.empty() ? samples_ : std::span<const TrackerObservation>(reachable);
@@ -91,21 +91,21 @@ class Screening {
     const std::vector<std::size_t> off_samples = with_off_time(off.samples, kept, run);
 
     found_.off_line = off_samples.size();
-    found_.noisy_blocks = off.blocks.size();
+    found_.noisy_segments = off.segments.size();
     if (!off_samples.empty()) {
       aside_.resize(samples_.size(), false);
       for (const std::size_t i : off_samples) {
         aside_[i] = true;
       }
-      Result<AlignedBlocks> again = aligned_without_aside();
+      Result<AlignedSegments> again = aligned_without_aside();
       if (!again) {
         return again;
       }
       run = *std::move(again);
     }
 
-    for (const OffLine::Noisy& noisy : off.blocks) {
-      run.series.blocks[noisy.block].noise_factor = noisy.noise_factor;
+    for (const OffLine::Noisy& noisy : off.segments) {
+      run.series.segments[noisy.segment].noise_factor = noisy.noise_factor;
     }
     if (!aside_.empty()) {
       add_places(found_, samples_, aside_, run);
@@ -119,7 +119,7 @@ class Screening {
   /// Adds the samples that are wrong along the travel, if that component is used.
   [[nodiscard]] std::vector<std::size_t> with_off_time(std::vector<std::size_t> off,
                                                        std::span<const TrackerObservation> samples,
-                                                       const AlignedBlocks& run) const {
+                                                       const AlignedSegments& run) const {
     if (options_.encoders != nullptr) {
       const std::vector<std::size_t> more =
           off_time_samples(samples, run.series, run.alignment, path_, noise_);
@@ -130,14 +130,15 @@ class Screening {
     return off;
   }
 
-  Result<AlignedBlocks> aligned_without_aside() {
-    return make_blocks(without_aside(samples_, aside_), options_).and_then([&](BlockSeries series) {
-      series.lost_samples -= count_of(aside_);
-      return aligned(std::move(series));
-    });
+  Result<AlignedSegments> aligned_without_aside() {
+    return make_segments(without_aside(samples_, aside_), options_)
+        .and_then([&](SegmentSeries series) {
+          series.lost_samples -= count_of(aside_);
+          return aligned(std::move(series));
+        });
   }
 
-  Result<AlignedBlocks> aligned(BlockSeries series) {
+  Result<AlignedSegments> aligned(SegmentSeries series) {
     const Result<void> valid =
         check(noise_).and_then([&] { return check_travel(series, options_); });
     ABBE_TRY(valid);
@@ -145,7 +146,7 @@ class Screening {
     Result<Alignment> alignment = align(series, machine_, path_, options_);
     options_.progress = {};  // the first alignment has reported it
     ABBE_TRY(alignment);
-    return AlignedBlocks{std::move(series), *std::move(alignment)};
+    return AlignedSegments{std::move(series), *std::move(alignment)};
   }
 
   std::span<const TrackerObservation> samples_;
@@ -169,7 +170,7 @@ std::string taken_out_text(const NestVisits& nests) {
   return "visits of reference nests are not part of the run: " + names;
 }
 
-AlignedBlocks with_nests(AlignedBlocks run, NestVisits nests) {
+AlignedSegments with_nests(AlignedSegments run, NestVisits nests) {
   run.series.lost_samples -= nests.samples.size();
   run.nests = std::move(nests);
   return run;
@@ -177,9 +178,9 @@ AlignedBlocks with_nests(AlignedBlocks run, NestVisits nests) {
 
 }  // namespace
 
-Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples,
-                                     const Machine& machine, const Path& path, const Noise& noise,
-                                     const Options& options) {
+Result<AlignedSegments> aligned_segments(std::span<const TrackerObservation> samples,
+                                         const Machine& machine, const Path& path,
+                                         const Noise& noise, const Options& options) {
   Result<NestVisits> nests = find_nest_visits(samples, options.nests, noise);
   ABBE_TRY(nests);
   const auto with_notes = [&](Error error) {
@@ -193,8 +194,8 @@ Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples
   };
   if (nests->samples.empty()) {
     return Screening(samples, machine, path, noise, options)
-        .blocks()
-        .map([&](AlignedBlocks run) { return with_nests(std::move(run), *std::move(nests)); })
+        .segments()
+        .map([&](AlignedSegments run) { return with_nests(std::move(run), *std::move(nests)); })
         .map_error(with_notes);
   }
 
@@ -203,8 +204,8 @@ Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples
     without[i].valid = false;
   }
   return Screening(without, machine, path, noise, options)
-      .blocks()
-      .map([&](AlignedBlocks run) { return with_nests(std::move(run), *std::move(nests)); })
+      .segments()
+      .map([&](AlignedSegments run) { return with_nests(std::move(run), *std::move(nests)); })
       .map_error(with_notes);
 }
 

@@ -1,4 +1,4 @@
-#include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/axis_zero.hpp"
 
 #include <fmt/format.h>
 
@@ -31,7 +31,7 @@ bool has_marks(const Config& config, const std::string& axis) {
          std::ranges::find(marks->axes, axis, &AxisMarks::axis) != marks->axes.end();
 }
 
-Datum::Datum(const Config& config, WithoutMarks without_marks) {
+AxisZeros::AxisZeros(const Config& config, WithoutMarks without_marks) {
   const auto counted = counted_axes(config);
   if (!counted) return;
   const auto& live = counted->axes();
@@ -43,37 +43,37 @@ Datum::Datum(const Config& config, WithoutMarks without_marks) {
     axis.step = live[i].scale;
     axis.offset = live[i].offset;
     axis.zero_is_here = !marks && counted->zero_is_here;
-    if (axis.zero_is_here) axis.current = FoundDatum{.axis = i, .reading_at_zero = axis.offset};
+    if (axis.zero_is_here) axis.current = FoundZero{.axis = i, .reading_at_zero = axis.offset};
   }
 }
 
-void Datum::go_on(const DatumState& state) {
+void AxisZeros::go_on(const ZeroState& state) {
   begun_ = true;
   for (Axis& axis : axes_) {
     if ((state.unknown >> axis.place & 1u) == 0) continue;
     axis.current.reset();
-    std::erase_if(axis.coming, [&state](const FoundDatum& found) { return found.from < state.at; });
+    std::erase_if(axis.coming, [&state](const FoundZero& found) { return found.from < state.at; });
   }
 }
 
-void Datum::found(const FoundDatum& datum) {
+void AxisZeros::found(const FoundZero& zero) {
   for (Axis& axis : axes_)
-    if (axis.place == datum.axis) axis.coming.push_back(datum);
+    if (axis.place == zero.axis) axis.coming.push_back(zero);
 }
 
-bool Datum::known(std::size_t place) const {
+bool AxisZeros::known(std::size_t place) const {
   const auto axis = std::ranges::find(axes_, place, &Axis::place);
   return axis == axes_.end() || axis->current || !axis->coming.empty();
 }
 
-std::vector<FoundDatum> Datum::current() const {
-  std::vector<FoundDatum> all;
+std::vector<FoundZero> AxisZeros::current() const {
+  std::vector<FoundZero> all;
   for (const Axis& axis : axes_)
     if (axis.current) all.push_back(*axis.current);
   return all;
 }
 
-void Datum::move_on(const protocol::SampleHead& head) {
+void AxisZeros::move_on(const protocol::SampleHead& head) {
   for (Axis& axis : axes_) {
     while (!axis.coming.empty() && axis.coming.front().from < head.time) {
       axis.current = axis.coming.front();
@@ -86,7 +86,7 @@ void Datum::move_on(const protocol::SampleHead& head) {
 }
 
 template <class Counted>
-void Datum::apply_to_counts(Counted& sample) const {
+void AxisZeros::apply_to_counts(Counted& sample) const {
   for (const Axis& axis : axes_) {
     if (axis.current) {
       sample.position[axis.place] =
@@ -97,12 +97,12 @@ void Datum::apply_to_counts(Counted& sample) const {
   }
 }
 
-void Datum::apply(protocol::AxisSample& sample) {
+void AxisZeros::apply(protocol::AxisSample& sample) {
   move_on(sample.head);
   apply_to_counts(sample);
 }
 
-void Datum::apply(protocol::ProbeTrigger& touch) const {
+void AxisZeros::apply(protocol::ProbeTrigger& touch) const {
   for (const Axis& axis : axes_) {
     if (axis.current) {
       touch.position[axis.place] += axis.current->reading_at_zero - axis.offset;
@@ -112,37 +112,37 @@ void Datum::apply(protocol::ProbeTrigger& touch) const {
   }
 }
 
-void Datum::apply(Batch& batch) {
+void AxisZeros::apply(Batch& batch) {
   if (axes_.empty()) return;
   for (auto& sample : batch.axes) apply(sample);
   for (auto& touch : batch.touches) apply(touch);
   for (auto& scan : batch.touch_scans) apply_to_counts(scan);
 }
 
-RecordingAttachment to_attachment(const FoundDatum& datum) {
-  const json content{{"axis", datum.axis},
-                     {"reading_at_zero", datum.reading_at_zero},
-                     {"u", datum.u},
-                     {"stated", datum.stated},
-                     {"from_ns", datum.from.time_since_epoch().count()}};
-  return {.name = std::string{kDatumName},
+RecordingAttachment to_attachment(const FoundZero& zero) {
+  const json content{{"axis", zero.axis},
+                     {"reading_at_zero", zero.reading_at_zero},
+                     {"u", zero.u},
+                     {"stated", zero.stated},
+                     {"from_ns", zero.from.time_since_epoch().count()}};
+  return {.name = std::string{kZeroName},
           .media_type = "application/json",
           .content = json_text(content)};
 }
 
-RecordingAttachment to_attachment(const DatumState& state) {
-  return {.name = std::string{kDatumStateName},
+RecordingAttachment to_attachment(const ZeroState& state) {
+  return {.name = std::string{kZeroStateName},
           .media_type = "application/json",
           .content = json_text(
               json{{"at_ns", state.at.time_since_epoch().count()}, {"unknown", state.unknown}})};
 }
 
-Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment) {
+Result<ZeroState> zero_state_from_attachment(const RecordingAttachment& attachment) {
   try {
     const auto parsed = content_of(attachment);
     ABBE_TRY(parsed);
     const json& content = *parsed;
-    return DatumState{
+    return ZeroState{
         .at = protocol::HostTime{std::chrono::nanoseconds{content.at("at_ns").get<std::int64_t>()}},
         .unknown = content.at("unknown").get<std::uint8_t>()};
   } catch (const json::exception& e) {
@@ -169,12 +169,12 @@ Result<protocol::HostTime> reference_request_from(const RecordingAttachment& att
   }
 }
 
-Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) {
+Result<FoundZero> zero_from_attachment(const RecordingAttachment& attachment) {
   try {
     const auto parsed = content_of(attachment);
     ABBE_TRY(parsed);
     const json& content = *parsed;
-    return FoundDatum{
+    return FoundZero{
         .axis = content.at("axis").get<std::size_t>(),
         .reading_at_zero = content.at("reading_at_zero").get<double>(),
         .u = content.at("u").get<double>(),

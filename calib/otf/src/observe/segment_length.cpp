@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "abbe/calib/otf/observe/blocks.hpp"
+#include "abbe/calib/otf/observe/segments.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -30,14 +30,14 @@ std::optional<double> travel_per_sample_m(std::span<const TrackerObservation> sa
 
 }  // namespace
 
-std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) {
+std::size_t suitable_segment_samples(std::span<const TrackerObservation> samples) {
   constexpr std::size_t kUnknownTravel = 10;
   std::size_t chord = 50;
   std::optional<double> travel_m = travel_per_sample_m(samples, chord);
 
-  // With a low sample rate, a chord over many samples would be longer than a block and cut the
+  // With a low sample rate, a chord over many samples would be longer than a segment and cut the
   // corners of the path.
-  while (chord > 1 && travel_m && *travel_m * static_cast<double>(chord) > kBlockTravel_m) {
+  while (chord > 1 && travel_m && *travel_m * static_cast<double>(chord) > kSegmentTravel_m) {
     chord = std::max<std::size_t>(1, chord / 5);
     travel_m = travel_per_sample_m(samples, chord);
   }
@@ -46,16 +46,17 @@ std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) 
     return kUnknownTravel;
   }
 
-  return block_samples_for_travel(*travel_m);
+  return segment_samples_for_travel(*travel_m);
 }
 
-std::size_t block_samples_for_travel(double travel_per_sample_m) {
+std::size_t segment_samples_for_travel(double travel_per_sample_m) {
   constexpr std::size_t kLargest = 1000;
-  if (!(travel_per_sample_m * double{kLargest} > kBlockTravel_m)) {
+  if (!(travel_per_sample_m * double{kLargest} > kSegmentTravel_m)) {
     return kLargest;
   }
 
-  const auto suitable = static_cast<std::size_t>(std::lround(kBlockTravel_m / travel_per_sample_m));
+  const auto suitable =
+      static_cast<std::size_t>(std::lround(kSegmentTravel_m / travel_per_sample_m));
   return std::clamp<std::size_t>(suitable, 1, kLargest);
 }
 

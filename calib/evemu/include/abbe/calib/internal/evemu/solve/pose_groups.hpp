@@ -1,7 +1,8 @@
 #pragma once
-/// The observations of a ball array as blocks over any form of model (estimation/block.hpp), one
-/// block per position of the array. The pose of the array at each position is a nuisance of its
-/// block without prior; errors of the array are unknowns that all blocks share (artefact_rows.hpp).
+/// The observations of a ball array as groups over any form of model
+/// (estimation/observation_group.hpp), one group per position of the array. The pose of the array
+/// at each position is a nuisance of its group without prior; errors of the array are unknowns that
+/// all groups share (artefact_rows.hpp).
 /// At position p, a_i: calibrated centre of ball i, r_i: its reading, T_p: pose of the array,
 ///     T_p a_i = r_i + D_i(V)
 /// D_i(V): displacement of the fitted centre by V at the touched points (observe.hpp), or V(r_i)
@@ -19,13 +20,13 @@
 #include <functional>
 #include <vector>
 
-#include "abbe/calib/estimation/block.hpp"
+#include "abbe/calib/estimation/observation_group.hpp"
 #include "abbe/calib/evemu/observe/observe.hpp"
 #include "abbe/calib/internal/evemu/solve/volumetric_design.hpp"
 
 namespace abbe::calib::evemu {
 
-struct PoseBlockOptions {
+struct PoseGroupOptions {
   /// Standard deviation of a ball centre per coordinate, must be positive. Slow noise is that of
   /// Observations::slow_noise.
   double s_m = 1e-6;
@@ -33,11 +34,10 @@ struct PoseBlockOptions {
   std::function<Vector3(const Vector3& reading_m)> V_at_m{};
 };
 
-/// One block per position, in the order of the positions. Unknowns: those of the design, then one
+/// One group per position, in the order of the positions. Unknowns: those of the design, then one
 /// error of the array per column of artefact_rows(), each with standard deviation 1 (the caller adds
 /// their prior). Errors: BadInput for an s that is not positive; those of fit_rigid().
-[[nodiscard]] Result<std::vector<estimation::Block>> pose_blocks(const Observations&,
-                                                                 const VolumetricDesign&,
-                                                                 const PoseBlockOptions&);
+[[nodiscard]] Result<std::vector<estimation::ObservationGroup>> pose_groups(
+    const Observations&, const VolumetricDesign&, const PoseGroupOptions&);
 
 }  // namespace abbe::calib::evemu

@@ -1,4 +1,4 @@
-#include "abbe/calib/internal/evemu/solve/pose_blocks.hpp"
+#include "abbe/calib/internal/evemu/solve/pose_groups.hpp"
 
 #include <Eigen/Core>
 #include <cmath>
@@ -35,7 +35,7 @@ std::vector<Vector3> placed_m(const Observations& o, const PositionRows& p) {
 }
 
 std::vector<Vector3> corrected_m(const Observations& o, const PositionRows& p,
-                                 const PoseBlockOptions& options) {
+                                 const PoseGroupOptions& options) {
   std::vector<Vector3> corrected;
   for (std::size_t i = p.first; i < p.first + p.count; ++i) {
     const Vector3& r = o.rows[i].reading_m;
@@ -45,8 +45,9 @@ std::vector<Vector3> corrected_m(const Observations& o, const PositionRows& p,
 }
 
 /// y, L and the columns of the model.
-void fill_pose_block(estimation::Block& block, const Observations& o, const PositionRows& p,
-                     const RigidTransform& pose, const VolumetricDesign& design) {
+void fill_pose_group(estimation::ObservationGroup& group, const Observations& o,
+                     const PositionRows& p, const RigidTransform& pose,
+                     const VolumetricDesign& design) {
   const TouchedArtefact* seen = touched_at(o, p.position);
   const bool has_points = seen != nullptr && seen->ball_points_m.size() == p.count;
   const std::vector<Vector3> places = placed_m(o, p);
@@ -56,19 +57,19 @@ void fill_pose_block(estimation::Block& block, const Observations& o, const Posi
   for (std::size_t b = 0; b < p.count; ++b) {
     const auto row = static_cast<Eigen::Index>(3 * b);
     const Vector3& reading_m = o.rows[p.first + b].reading_m;
-    block.y.segment<3>(row) = pose * places[b] - reading_m;
-    block.A.block(row, 0, 3, model) =
+    group.y.segment<3>(row) = pose * places[b] - reading_m;
+    group.A.block(row, 0, 3, model) =
         has_points ? ball_displacement(*seen, b, design) : design.B(reading_m);
-    block.L.block<3, 3>(row, 0).setIdentity();
-    block.L.block<3, 3>(row, 3) = rotation_effect(reading_m - ball1_m);
+    group.L.block<3, 3>(row, 0).setIdentity();
+    group.L.block<3, 3>(row, 3) = rotation_effect(reading_m - ball1_m);
   }
 }
 
 }  // namespace
 
-Result<std::vector<estimation::Block>> pose_blocks(const Observations& o,
-                                                   const VolumetricDesign& design,
-                                                   const PoseBlockOptions& options) {
+Result<std::vector<estimation::ObservationGroup>> pose_groups(const Observations& o,
+                                                              const VolumetricDesign& design,
+                                                              const PoseGroupOptions& options) {
   if (!(options.s_m > 0.0) || !std::isfinite(options.s_m)) {
     return failure(ErrorCode::BadInput, message("ball array: standard deviation ", options.s_m,
                                                 " m of a ball centre must be positive"));
@@ -77,7 +78,7 @@ Result<std::vector<estimation::Block>> pose_blocks(const Observations& o,
   const Eigen::MatrixXd of_array = artefact_rows(o);
   std::vector<std::size_t> unknowns(design.unknowns + static_cast<std::size_t>(of_array.cols()));
   std::iota(unknowns.begin(), unknowns.end(), std::size_t{0});
-  std::vector<estimation::Block> blocks;
+  std::vector<estimation::ObservationGroup> groups;
 
   for (const PositionRows& p : position_rows(o)) {
     const Result<RigidTransform> pose = fit_rigid(placed_m(o, p), corrected_m(o, p, options));
@@ -87,26 +88,26 @@ Result<std::vector<estimation::Block>> pose_blocks(const Observations& o,
     }
 
     const auto rows = static_cast<Eigen::Index>(3 * p.count);
-    estimation::Block block{.unknowns = unknowns,
-                            .A = Eigen::MatrixXd::Zero(rows, std::ssize(unknowns)),
-                            .L = Eigen::MatrixXd::Zero(rows, 6),
-                            .u_nuisance = std::vector<double>(6, estimation::kNoPrior),
-                            .y = Eigen::VectorXd::Zero(rows),
-                            .covariance = Eigen::MatrixXd::Zero(rows, rows)};
-    fill_pose_block(block, o, p, *pose, design);
-    block.A.rightCols(of_array.cols()) =
+    estimation::ObservationGroup group{.unknowns = unknowns,
+                                       .A = Eigen::MatrixXd::Zero(rows, std::ssize(unknowns)),
+                                       .L = Eigen::MatrixXd::Zero(rows, 6),
+                                       .u_nuisance = std::vector<double>(6, estimation::kNoPrior),
+                                       .y = Eigen::VectorXd::Zero(rows),
+                                       .covariance = Eigen::MatrixXd::Zero(rows, rows)};
+    fill_pose_group(group, o, p, *pose, design);
+    group.A.rightCols(of_array.cols()) =
         of_array.middleRows(static_cast<Eigen::Index>(3 * p.first), rows);
 
     const Eigen::MatrixXd C =
         centre_covariance_m2(o, touched_at(o, p.position), p.count, options.s_m);
     for (Eigen::Index c = 0; c < 3; ++c) {
       const auto of_component = Eigen::seqN(c, static_cast<Eigen::Index>(p.count), 3);
-      block.covariance(of_component, of_component) = C;
+      group.covariance(of_component, of_component) = C;
     }
-    blocks.push_back(std::move(block));
+    groups.push_back(std::move(group));
   }
 
-  return blocks;
+  return groups;
 }
 
 }  // namespace abbe::calib::evemu

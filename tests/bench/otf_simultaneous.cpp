@@ -1,16 +1,16 @@
-// Question: is the joint estimate of on-the-fly calibration as good as the data allow, and is its
-// stated uncertainty right, with white and with correlated noise? Requirements:
-// - case A without noise: mean error 0.0004 um in gauge G1 (two-step 0.026), at most 0.3 s of
-//   processor time from the blocks to the solution (alignment, three adjustments, covariance);
-// - case A with noise: joint from blocks within 5 % of the prototype's 0.0995 um, and from every
-//   sample as a block at most 5 % above its 0.0943 um (two-step);
+// Question: is the simultaneous estimate of on-the-fly calibration as good as the data allow, and
+// is its stated uncertainty right, with white and with correlated noise? Requirements:
+// - case A without noise: mean error 0.0004 um in datum G1 (two-step 0.026), at most 0.3 s of
+//   processor time from the segments to the solution (alignment, three adjustments, covariance);
+// - case A with noise: simultaneous from segments within 5 % of the prototype's 0.0995 um, and from
+//   every sample as a segment at most 5 % above its 0.0943 um (two-step);
 // - 20 simulated machines, white noise: root mean square of the error at most 1.02 times the
 //   Cramer-Rao bound, mean squared normalised error 0.9 to 1.1;
 // - the same with noise that is correlated over 1 s: mean squared normalised error 0.85 to 1.15,
 //   and an error not larger than without prewhitening.
 // ABBE_REF_DIR names the folder of the reference data, by default beside the clone.
 //
-//   bench_otf_joint [machines = 20] [first seed = 1]
+//   bench_otf_simultaneous [machines = 20] [first seed = 1]
 
 #include <array>
 #include <cmath>
@@ -49,7 +49,7 @@ double seconds_since(std::clock_t start) {
   return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
-/// Mean error of a model of case A on the grid of the nodes, gauge G1.
+/// Mean error of a model of case A on the grid of the nodes, datum G1.
 double mean_error_m(const VolumetricModel& model) {
   const Machine machine = reference::case_a_machine();
   const auto layout = *ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
@@ -64,31 +64,31 @@ double mean_error_m(const VolumetricModel& model) {
 }
 
 struct CaseA {
-  double error_m = 0.0, seconds = 0.0, seconds_from_blocks = 0.0;
+  double error_m = 0.0, seconds = 0.0, seconds_from_segments = 0.0;
   int adjustments = 0;
 };
 
 CaseA case_a(const std::vector<TrackerObservation>& samples, Estimator estimator,
-             std::size_t block_samples) {
+             std::size_t segment_samples) {
   Options options;
   options.estimator = estimator;
-  options.block_samples = block_samples;
+  options.segment_samples = segment_samples;
   const std::clock_t start = std::clock();
   const auto found =
       *identify(samples, reference::case_a_machine(), reference::case_a_path(), {}, options);
   const double seconds = seconds_since(start);
-  const BlockSeries series = *make_blocks(samples, options);
-  const std::clock_t of_blocks = std::clock();
+  const SegmentSeries series = *make_segments(samples, options);
+  const std::clock_t of_segments = std::clock();
   const auto again =
-      identify_blocks(series, reference::case_a_machine(), reference::case_a_path(), {}, options);
-  const double from_blocks = again ? seconds_since(of_blocks) : 1e9;
-  const CaseA result{mean_error_m(found.solution.model), seconds, from_blocks,
+      identify_segments(series, reference::case_a_machine(), reference::case_a_path(), {}, options);
+  const double from_segments = again ? seconds_since(of_segments) : 1e9;
+  const CaseA result{mean_error_m(found.solution.model), seconds, from_segments,
                      found.solution.statistics.iterations};
   std::printf(
-      "  %-8s blocks of %3zu: mean error %.6f um, %d adjustments, %.3f s; again from the "
-      "blocks: %.3f s\n",
-      std::string(name(estimator)).c_str(), block_samples, 1e6 * result.error_m, result.adjustments,
-      result.seconds, result.seconds_from_blocks);
+      "  %-8s segments of %3zu: mean error %.6f um, %d adjustments, %.3f s; again from the "
+      "segments: %.3f s\n",
+      std::string(name(estimator)).c_str(), segment_samples, 1e6 * result.error_m,
+      result.adjustments, result.seconds, result.seconds_from_segments);
   return result;
 }
 
@@ -108,16 +108,16 @@ void reference_case() {
   std::printf("case A without noise\n");
   auto samples = reference::read_stream(*exact);
   case_a(samples, Estimator::TwoStep, 100);
-  const CaseA joint = case_a(samples, Estimator::Joint, 100);
-  ask(joint.error_m <= 0.0004e-6, "case A without noise: 0.0004 um");
-  ask(joint.seconds_from_blocks <= 0.3, "case A: 0.3 s from the blocks");
+  const CaseA simultaneous = case_a(samples, Estimator::Simultaneous, 100);
+  ask(simultaneous.error_m <= 0.0004e-6, "case A without noise: 0.0004 um");
+  ask(simultaneous.seconds_from_segments <= 0.3, "case A: 0.3 s from the segments");
 
   std::printf("case A with noise\n");
   samples = reference::read_stream(*noisy);
   case_a(samples, Estimator::TwoStep, 100);
-  ask(within(case_a(samples, Estimator::Joint, 100).error_m, 0.099472e-6, 0.05),
-      "case A with noise, blocks: 5 %");
-  ask(case_a(samples, Estimator::Joint, 1).error_m <= 1.05 * 0.094306e-6,
+  ask(within(case_a(samples, Estimator::Simultaneous, 100).error_m, 0.099472e-6, 0.05),
+      "case A with noise, segments: 5 %");
+  ask(case_a(samples, Estimator::Simultaneous, 1).error_m <= 1.05 * 0.094306e-6,
       "case A with noise, all samples: 5 %");
 }
 
@@ -131,19 +131,19 @@ Simulated simulate(std::uint64_t first_seed, std::uint64_t machines, double corr
     OtfRun run = noise_only(seed, correlation_s);
     const auto samples = never_worse::measure(run);
     Options options;
-    options.block_samples = suitable_block_samples(samples);
+    options.segment_samples = suitable_segment_samples(samples);
     const Path path{run.path_m};
     sums.two_step.add(run,
                       identify(samples, run.machine, path, run.noise, options)->solution.model);
-    options.estimator = Estimator::Joint;
-    const auto joint = *identify(samples, run.machine, path, run.noise, options);
-    sums.prewhitened.add(run, joint.solution.model);
-    sums.white.add(run, solve(joint.observations, options)->model);
+    options.estimator = Estimator::Simultaneous;
+    const auto simultaneous = *identify(samples, run.machine, path, run.noise, options);
+    sums.prewhitened.add(run, simultaneous.solution.model);
+    sums.white.add(run, solve(simultaneous.observations, options)->model);
   }
 
   sums.two_step.print("two-step");
-  sums.white.print("joint, not prewhitened");
-  sums.prewhitened.print("joint");
+  sums.white.print("simultaneous, not prewhitened");
+  sums.prewhitened.print("simultaneous");
   return sums;
 }
 

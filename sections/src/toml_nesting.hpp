@@ -1,6 +1,6 @@
 #pragma once
-/// Checks the nesting depth of a TOML text before it is parsed. Pure; allocates in proportion to the
-/// depth; no recursion.
+/// Checks the nesting depth of a TOML text before it is parsed. Pure; allocates in proportion to
+/// the depth; no recursion.
 
 #include <cstddef>
 #include <optional>

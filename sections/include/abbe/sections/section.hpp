@@ -50,7 +50,7 @@ enum class Need { Optional, Required };
 /// unreadable.
 enum class Origin { Written, Recorded };
 
-/// What the fault of an unknown key names: a similar key only, or without one all keys of the table.
+/// What the fault of an unknown key names: a similar key; or, if there is none, all keys.
 enum class Hint { SimilarKey, AllKeys };
 
 class Section {

@@ -65,6 +65,8 @@ struct HubParts {
 class Hub : private PipelineObserver {
  public:
   using WallTime = Publisher::WallTime;
+  /// Thousands of cycles: a hub that has not answered for this long hangs.
+  static constexpr std::chrono::seconds kHangsAfter{1};
 
   explicit Hub(HubParts parts);
   Hub(const Hub&) = delete;

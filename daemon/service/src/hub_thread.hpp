@@ -1,0 +1,32 @@
+#pragma once
+/// The hub's thread: soft real time, above the ordinary programs and below the devices.
+
+#include <future>
+#include <thread>
+
+#include "abbe/config/config.hpp"
+#include "abbe/service/hub.hpp"
+
+namespace abbe::daemon {
+
+class HubThread {
+ public:
+  HubThread() = default;
+  HubThread(const HubThread&) = delete;
+  HubThread& operator=(const HubThread&) = delete;
+  ~HubThread() { end(); }
+
+  /// Starts the thread, which waits for run(). Io if the system refuses its priority; the thread
+  /// then has none. So a refusal is known before the hub exists.
+  [[nodiscard]] Result<void> start(const DaemonConfig& config);
+  /// Runs the hub on the thread. `hub` must exist until end().
+  void run(Hub& hub) { hub_.set_value(&hub); }
+  /// Waits for the end of the thread; the hub must have been told to stop. No effect without one.
+  void end();
+
+ private:
+  std::promise<Hub*> hub_;  // broken if the start of abbed failed
+  std::thread thread_;
+};
+
+}  // namespace abbe::daemon

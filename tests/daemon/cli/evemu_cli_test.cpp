@@ -38,7 +38,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-std::string calibrator_toml() {
+std::string l_array_toml() {
   const auto c = tests::evemu::reference_calibrator();
   std::string text = "[calibrator]\nname = \"L array\"\ntip_radius_mm = 0\n";
   for (const auto& b : c.balls)
@@ -89,7 +89,7 @@ class EvemuCli : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   static void write_files(const fs::path& folder) {
-    static const std::string calibrator = calibrator_toml(), touched = touches_csv(),
+    static const std::string calibrator = l_array_toml(), touched = touches_csv(),
                              errors = errors_csv();
     fs::create_directories(folder);
     test::write_text(folder / "machine.toml", to_toml(config_tables::weak_portal()));
@@ -379,7 +379,7 @@ TEST_F(EvemuCli, NamesAPositionWithoutTouches) {
 /// The calibrator file with 15 mm for 12.7 mm as the radius of these balls.
 std::string calibrator_with_another_radius(std::initializer_list<int> balls) {
   const std::string_view radius = "radius_mm = 12.7";
-  std::string text = calibrator_toml();
+  std::string text = l_array_toml();
   for (const int ball : balls) {
     const auto at = text.find(radius, text.find(fmt::format("number = {}", ball)));
     text.replace(at, radius.size(), "radius_mm = 15.0");

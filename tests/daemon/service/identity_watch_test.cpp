@@ -18,7 +18,7 @@ using testing::HasSubstr;
 using v1::ModelStatus;
 
 constexpr protocol::UtcTime kStart{20'000h * 24};
-const ComputerMarks kHere{.machine_id = "a", .interfaces = {"1"}};
+const ComputerMarks kThisComputer{.machine_id = "a", .interfaces = {"1"}};
 const ComputerMarks kElsewhere{.machine_id = "b", .interfaces = {"2"}};
 
 class IdentityWatchTest : public testing::Test {
@@ -54,15 +54,15 @@ class IdentityWatchTest : public testing::Test {
 };
 
 TEST_F(IdentityWatchTest, OnTheComputerWhereItWasMadeAModelStaysActive) {
-  const auto made = open(kHere);
-  const auto again = open(kHere);
+  const auto made = open(kThisComputer);
+  const auto again = open(kThisComputer);
   EXPECT_EQ(again.known().machine_id, made.known().machine_id);
   EXPECT_EQ(restricted(again).status, ModelStatus::MODEL_ACTIVE);
   EXPECT_TRUE(again.health("").status.connected);
 }
 
 TEST_F(IdentityWatchTest, OnAnotherComputerNoModelIsActiveBeforeAPersonConfirmsIt) {
-  const auto machine_id = open(kHere).known().machine_id;
+  const auto machine_id = open(kThisComputer).known().machine_id;
   auto copied = open(kElsewhere);
   EXPECT_EQ(copied.known().machine_id, machine_id);
   for (const auto status : {ModelStatus::MODEL_ACTIVE, ModelStatus::MODEL_DRIFT})
@@ -87,7 +87,7 @@ TEST_F(IdentityWatchTest, AfterNewOnlyAModelThatWasActivatedLaterMayBeUsed) {
     EXPECT_TRUE(store.activate(id, actor));
     return id;
   };
-  const auto machine_id = open(kHere).known().machine_id;
+  const auto machine_id = open(kThisComputer).known().machine_id;
   const auto copied_model = activate(1);
   auto copied = open(kElsewhere);
   ASSERT_TRUE(decide_identity(folder_, kElsewhere,
@@ -106,7 +106,7 @@ TEST_F(IdentityWatchTest, AfterNewOnlyAModelThatWasActivatedLaterMayBeUsed) {
 }
 
 TEST_F(IdentityWatchTest, ATwinIsReportedAndDoesNotStopTheModel) {
-  const auto watch = open(kHere);
+  const auto watch = open(kThisComputer);
   const auto health = watch.health("the same name, machine_id 4711, from DDS participant 01");
   EXPECT_STREQ(std::string(health.status.state).c_str(), "twin");
   EXPECT_THAT(health.status.last_fault, HasSubstr("machine_id 4711"));
@@ -114,15 +114,15 @@ TEST_F(IdentityWatchTest, ATwinIsReportedAndDoesNotStopTheModel) {
 }
 
 TEST_F(IdentityWatchTest, ADamagedFileLetsNoModelBecomeActive) {
-  ASSERT_FALSE(open(kHere).known().machine_id.empty());
+  ASSERT_FALSE(open(kThisComputer).known().machine_id.empty());
   std::filesystem::resize_file(identity_file(folder_), 10);
-  const auto damaged = open(kHere);
+  const auto damaged = open(kThisComputer);
   EXPECT_EQ(restricted(damaged).status, ModelStatus::MODEL_STALE);
   EXPECT_THAT(damaged.health("").status.last_fault, HasSubstr("identity.json"));
 }
 
 TEST_F(IdentityWatchTest, WhileTheFileCannotBeReadTheDoubtStays) {
-  const auto machine_id = open(kHere).known().machine_id;
+  const auto machine_id = open(kThisComputer).known().machine_id;
   auto copied = open(kElsewhere);
   const auto doubt = copied.known().doubt;
   const auto file = identity_file(folder_);

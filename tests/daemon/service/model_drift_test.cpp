@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using v1::ModelStatus;
 
-constexpr HostTime kStart{1000s};
+constexpr HostTime kDriftStart{1000s};
 
 StoreActor drift_actor(std::string why) {
   return {"anna", std::move(why), protocol::UtcTime{1'715'934'600s}};
@@ -265,8 +265,8 @@ class DriftingMachine : public ::testing::Test {
   [[nodiscard]] ModelStore store() const { return ModelStore{folder_.path() / "models"}; }
 
   static constexpr std::chrono::nanoseconds kFirstDay = std::chrono::hours{24 * 365 * 55};
-  HostTime now_ = kStart;
-  std::atomic<HostTime> seen_{kStart};  // by the identification, another thread
+  HostTime now_ = kDriftStart;
+  std::atomic<HostTime> seen_{kDriftStart};  // by the identification, another thread
   std::atomic<std::chrono::nanoseconds> set_{}, suspended_{};
   TemporaryFolder folder_;
   Config config_;
@@ -384,7 +384,7 @@ TEST_F(DriftingMachine, TheModelHashDoesNotDependOnTheWallClock) {
   (void)calibrate();
   const auto before = model_hash(stored_model());
   set_ = 24h * 200;
-  seen_ = now_ = kStart;  // the same samples on another day
+  seen_ = now_ = kDriftStart;  // the same samples on another day
   restart();
   (void)calibrate();
   EXPECT_EQ(model_hash(stored_model()), before);

@@ -198,7 +198,8 @@ void CalibrationService::begin_identification(Acquisition acquired, HostTime now
       .who = session_.who()});
 }
 
-/// Reports to the session what the background task has reached, and stores a model again after an error.
+/// Reports to the session what the background task has reached, and stores a model again after an
+/// error.
 void CalibrationService::follow_background(HostTime now) {
   const bool task_ended = ready(task_);
   // The cycle that raises DRIFT publishes it, before another model becomes active.

@@ -233,8 +233,8 @@ TEST_F(PageOnTheFly, OpenViewsShowDrift) {
 }
 
 struct PageBallArray : Page<TouchingRun> {
-  /// abbe-web asks for the status every 0.5 s: each ball and block must be the next for longer, also
-  /// on a computer that draws slowly.
+  /// abbe-web asks for the status every 0.5 s: each ball and block must be the next for longer,
+  /// also on a computer that draws slowly.
   static constexpr int kSpeed = std::min(ABBE_SPINE_SPEED, 5);
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 /// The state of the calibration sessions, in one place: stage, reason, method, number, request,
-/// model, times, and the sessions that ended before. Its inputs are snapshots and the outcome of the
+/// model, times, earlier sessions. Its inputs are snapshots and the outcome of the
 /// identification, which the caller runs and reports. It reads no clock and starts no thread, so
 /// that a live run and its replay pass through the same states at the same recorded instants.
 ///

@@ -24,8 +24,8 @@ struct ModelsComparison {
   std::string different_machines;  ///< empty: they are the same
 };
 
-/// Usage: no second model; models of different machines that `other_machine` does not allow. DataInsufficient: the
-/// models have no common volume.
+/// Usage: no second model; models of different machines that `other_machine` does not allow.
+/// DataInsufficient: the models have no common volume.
 [[nodiscard]] Result<ModelsComparison> compare_models(const CompareModelsArguments&);
 
 }  // namespace abbe::daemon

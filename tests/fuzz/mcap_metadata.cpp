@@ -54,7 +54,7 @@ daemon::recording::Contents contents_of(mcap::Bytes bytes) {
   const auto file =
       daemon::recording::RecordedBytes::open("/proc/self/fd/" + std::to_string(memory.get()));
   require(file.has_value());
-  return daemon::recording::contents_of(**file);
+  return daemon::recording::contents_of(**file, {});
 }
 
 void check_sealed(std::map<std::string, MetadataEntries> metadata) {

@@ -46,7 +46,8 @@ Eigen::MatrixXd drawn_from(const Eigen::MatrixXd& covariance) {
   return factors.transpositionsP().transpose() * z;
 }
 
-/// Cells of the volume along each axis with one misfit each, at most.
+/// The volume is divided into at most this number of cells along each axis. The misfit of V is one
+/// value in a cell.
 constexpr int kMostCells = 5;
 
 /// Coefficients are 1 for translations and metres for rotations: smaller ones are rounding.

@@ -36,10 +36,11 @@ Result<void> check_same_effects(std::span<const Part> parts) {
       const auto [first, is_new] = stated.try_emplace(part.effects[k], u, &part);
       const auto& [u_first, of_first] = first->second;
       if (!is_new && !(std::abs(u - u_first) <= kSame * u_first)) {
-        return failure(ErrorCode::BadInput,
-                       message("joint identification: the uncertainty of '", part.effects[k],
-                               "' is ", u_first, " in ", of_first->name, ", ", u, " in ", part.name,
-                               ": state the same one, or another name if it is another error"));
+        return failure(
+            ErrorCode::BadInput,
+            message("joint identification: the uncertainty of '", part.effects[k], "' is ", u_first,
+                    " in ", of_first->name, ", ", u, " in ", part.name,
+                    ": state the same uncertainty, or another name if it is another cause"));
       }
     }
   }

@@ -208,8 +208,9 @@ void print_measured_text(const MeasuredComparison& found) {
 
   print_conventions(found);
   fmt::print(
-      "tool offset of the model: ({:.1f}, {:.1f}, {:.1f}) mm; the point of the device must be\n"
-      "there: with one tool offset, some rotations are part of the translations there\n",
+      "tool offset of the model: ({:.1f}, {:.1f}, {:.1f}) mm; the device must measure the point\n"
+      "with this offset: a model of one tool offset is right for this point only, because its\n"
+      "translations contain some rotations\n",
       kMmPerM * found.tool_m.x(), kMmPerM * found.tool_m.y(), kMmPerM * found.tool_m.z());
   const bool no_line = std::ranges::all_of(
       found.file.errors, [](const auto& error) { return !error.line_m.has_value(); });

@@ -73,7 +73,7 @@ Json fields(const v1::ErrorModel& m) {
           FIELD(model_id),
           FIELD(method),
           FIELD(estimator),
-          FIELD(datum),
+          FIELD(gauge),
           FIELD(chain),
           FIELD(basis),
           FIELD(squareness),

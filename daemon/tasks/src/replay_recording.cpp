@@ -96,7 +96,7 @@ json replay_json(const ReplayedRecording& replayed) {
            {"calibrations", json::array()}};
   for (const auto& loss : recording.losses()) out["losses"].push_back(loss.what);
 
-  for (const auto& d : r.datums)
+  for (const auto& d : r.zeros)
     out["reference"].push_back(
         {{"axis", d.axis}, {"live", d.live}, {"again", d.again ? json(*d.again) : json{}}});
   for (const auto& c : r.calibrations) out["calibrations"].push_back(calibration_json(c));

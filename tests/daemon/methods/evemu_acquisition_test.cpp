@@ -185,7 +185,8 @@ TEST(CalibrationRequest, KeepsEveryBitOfATaskWithABallArray) {
   auto& evemu = std::get<EvemuRequest>(asked.task);
   evemu.calibrator.balls[3].centre_m.x() = 0.1 + 0.2;
   evemu.plan = {{2, 1}, 7, 6};
-  evemu.reference = RotationPoints{{{.reading_m = {1.0 / 3, 0, 0}, .V_m = {0, 1e-7 / 3, 0}}}, 2e-6};
+  evemu.rotation_reference =
+      RotationPoints{{{.reading_m = {1.0 / 3, 0, 0}, .V_m = {0, 1e-7 / 3, 0}}}, 2e-6};
   evemu.sources = {{"calibrator.toml", "abc"}};
   const auto attachment = to_attachment(asked);
 
@@ -197,7 +198,7 @@ TEST(CalibrationRequest, KeepsEveryBitOfATaskWithABallArray) {
   EXPECT_EQ(again.calibrator.balls[3].centre_m, evemu.calibrator.balls[3].centre_m);
   EXPECT_EQ(again.plan.positions, evemu.plan.positions);
   EXPECT_EQ(again.plan.points_per_block, 6u);
-  EXPECT_EQ(again.reference->points[0].V_m, evemu.reference->points[0].V_m);
+  EXPECT_EQ(again.rotation_reference->points[0].V_m, evemu.rotation_reference->points[0].V_m);
   EXPECT_EQ(again.sources, evemu.sources);
 }
 

@@ -14,7 +14,7 @@ namespace abbe::daemon {
 
 /// File names; `out`: bar.toml.
 struct IdentifyBarArguments {
-  std::string bar, plan, points, datum, out;
+  std::string bar, plan, points, gauge, out;
 };
 
 struct IdentifiedBar {

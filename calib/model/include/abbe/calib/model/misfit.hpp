@@ -14,8 +14,8 @@
 namespace abbe::calib {
 
 struct Misfit {
-  /// m_T at the nodes, m or rad, in the order of the parameters of the model; 0 for the squareness
-  /// errors. Empty: no misfit of tables. Always empty for polynomials.
+  /// m_T at the nodes, standard uncertainties in m or rad, in the order of the parameters of the
+  /// model; 0 for the squareness errors. Empty: no misfit of tables. Always empty for polynomials.
   Eigen::VectorXd u_of_parameters{};
   Vector3 u_V_m = Vector3::Zero();  ///< of the components of V in machine axes
   /// Distance over which the misfit of the tables, and that of V, stay alike: their correlation

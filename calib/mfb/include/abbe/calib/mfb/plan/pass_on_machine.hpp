@@ -31,8 +31,8 @@ struct PassOnMachine {
   MachineTouches made;
 };
 /// BadInput: a clearance or height that is not positive, a clearance for which the tip does not fit
-/// into the holes, a height within the reach of the rods, or a bar_z that is not along that of the
-/// first measurement.
+/// into the holes, a height that the rods of the bar reach, or a bar_z with another direction than
+/// in the first measurement.
 [[nodiscard]] Result<PassOnMachine> pass_on_machine(const Bar&, const Plan&,
                                                     std::size_t measurement, const Vector3& from_m,
                                                     const MachineTouchOptions& = {});

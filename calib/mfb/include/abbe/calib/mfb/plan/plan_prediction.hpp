@@ -49,8 +49,8 @@ struct PositionInformation {
   std::size_t observations = 0, nuisances = 0;
 };
 
-/// Bar, machine, noise and options for which positions are compared. Immutable value; member
-/// functions may be called from any thread.
+/// Predicts the uncertainty that positions of a bar give, for one bar, machine and noise. Immutable
+/// value; member functions may be called from any thread.
 class PlanPredictor {
  public:
   PlanPredictor(PlanPredictor&&) noexcept;

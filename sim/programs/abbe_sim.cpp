@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "abbe/protocol/option_values.hpp"
+#include "abbe/protocol/option_words.hpp"
 #include "abbe/protocol/printable.hpp"
 #include "commands.hpp"
 
@@ -87,7 +88,7 @@ int run(int argc, char** argv) {
 
   try {
     protocol::check_option_values(app);
-    app.parse(argc, argv);
+    app.parse(protocol::option_words(app, {argv + 1, argv + argc}));
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }

@@ -1,6 +1,7 @@
 #include "read_counter_card.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 namespace abbe::sim {
@@ -95,7 +96,7 @@ void read_sim_counter_card(Section section, SimulationSetup& simulation) {
   section.get("noise_nm", noise_m, kNano, kNotNegativeNumber);
   section.get("clock_deviation_ppm", card.clock_deviation_ppm, kPlain, {-1000.0, 1000.0});
   section.get("fifo_kB", fifo_bytes, Unit{1e-3}, {1.0, 1e6});
-  card.fifo_bytes = static_cast<std::size_t>(fifo_bytes);
+  card.fifo_bytes = static_cast<std::size_t>(std::lround(fifo_bytes));
 
   for (CardAxis& axis : card.axes) axis.noise = noise_m;
   section.close(Hint::AllKeys);

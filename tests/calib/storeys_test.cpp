@@ -113,7 +113,7 @@ std::string room_of(const fs::path& file) {
   return file.parent_path().filename().string();
 }
 
-/// "observe/blocks.cpp includes solve" for each include of a room that is not before.
+/// "observe/segments.cpp includes solve" for each include of a room that is not before.
 std::vector<std::string> forbidden_rooms(const fs::path& method, const std::string& name) {
   static const std::regex local(R"(#\s*include\s*["<](?!abbe/)([a-z]+)/[A-Za-z0-9_/]+\.hpp[">])");
   std::vector<std::string> forbidden;

@@ -33,7 +33,7 @@ void expect_the_same(const std::string& command) {
 }
 
 TEST(SameBits, PrintsAHashOfEveryResult) {
-  for (const char* name : {"elementary", "spherical", "on-the-fly, blocks", "on-the-fly, samples",
+  for (const char* name : {"elementary", "spherical", "on-the-fly, segments", "on-the-fly, samples",
                            "on-the-fly, correlated noise", "on-the-fly, verdict",
                            "ball array, bayes-pose", "ball array, scad"})
     EXPECT_NE(native().find(std::string(name) + ' '), std::string::npos) << name;

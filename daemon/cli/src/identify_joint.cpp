@@ -15,8 +15,8 @@
 #include "abbe/report/sections.hpp"
 #include "abbe/tasks/joint_report.hpp"
 #include "commands.hpp"
+#include "earlier_words.hpp"
 #include "identified_model.hpp"
-#include "option_spelling.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 

@@ -13,9 +13,9 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/tasks/identify_mfb.hpp"
 #include "commands.hpp"
+#include "earlier_words.hpp"
 #include "identified_model.hpp"
 #include "mfb_summary.hpp"
-#include "option_spelling.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 

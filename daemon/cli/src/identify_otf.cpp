@@ -14,8 +14,8 @@
 #include "abbe/tasks/identify_otf.hpp"
 #include "backlash_lines.hpp"
 #include "commands.hpp"
+#include "earlier_words.hpp"
 #include "identified_model.hpp"
-#include "option_spelling.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 #include "tracker_drift_lines.hpp"
@@ -159,7 +159,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "--tracker-centre-mm", arguments->tracker_centres,
       "X,Y,Z: the tracker in the frame of points x_mm,y_mm,z_mm, such as machine or station\n"
       "coordinates, to about 0.1 m: noise and offset of the ranges act along its beams; with "
-      "several\n--target, one for all or one for each");
+      "several\n--target-mm, one for all or one for each");
   centre->allow_extra_args(false);
   auto* encoder = command->add_option(
       "--encoder", arguments->encoder,

@@ -57,8 +57,8 @@ void print_bar_plan(const BarPlan& plan, const mfb::Bar& bar) {
   fmt::print("predicted standard uncertainty (k = 1) of the 21 errors:\n");
   print_errors(plan.prediction);
   if (plan.start)
-    fmt::print("exchange    worst u / limit {:.3g}, before positions were exchanged {:.3g}\n", plan.prediction.worst,
-               plan.start->worst);
+    fmt::print("exchange    worst u / limit {:.3g}, before positions were exchanged {:.3g}\n",
+               plan.prediction.worst, plan.start->worst);
   for (const auto& missing : plan.missing) fmt::print("missing     {}\n", missing);
   for (const auto& note : plan.notes) fmt::print("note        {}\n", note);
 }

@@ -16,11 +16,12 @@
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/option_values.hpp"
+#include "abbe/protocol/option_words.hpp"
 #include "commands.hpp"
 #include "dds_keys.hpp"
+#include "earlier_words.hpp"
 #include "examples.hpp"
 #include "known_commands.hpp"
-#include "option_spelling.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -139,9 +140,7 @@ int parse_and_run(const std::vector<std::string>& words) {
   }
 
   try {
-    // CLI11 takes the words in reverse order.
-    const auto whole = present_names(words, app);
-    app.parse(std::vector<std::string>{whole.rbegin(), whole.rend()});
+    app.parse(protocol::option_words(app, present_options(words)));
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {

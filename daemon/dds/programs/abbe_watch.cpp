@@ -24,6 +24,7 @@
 #include "abbe/dds/participant_addresses.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
+#include "abbe/protocol/option_words.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/settings/dds_config.hpp"
 #include "watched_machines.hpp"
@@ -237,6 +238,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Shows the data that abbe publishes over DDS, and whether the correction may be applied by "
       "the rule of abbe_v1.idl: apply or not."};
+  app.name(argv[0]);
   app.footer(footer());
   app.set_version_flag("--version", "abbe-watch " ABBE_VERSION);
   Options options;
@@ -274,7 +276,7 @@ int main(int argc, char** argv) {
 
   try {
     daemon::check_option_values(app);
-    app.parse(argc, argv);
+    app.parse(protocol::option_words(app, {argv + 1, argv + argc}));
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }

@@ -115,14 +115,15 @@ void read_covariance(ModelReader& in, calib::ModelDescription& out) {
 
 void read_datum(ModelReader& in, calib::ModelDescription& out) {
   // "gauge": the earlier name
-  const auto text = in.text(in.has("gauge") ? "gauge" : "datum");
+  const std::string_view key = in.has("gauge") ? "gauge" : "datum";
+  const auto text = in.text(key);
   for (const auto datum : {calib::ModelDatum::G1, calib::ModelDatum::G2,
                            calib::ModelDatum::Ball1Blocks, calib::ModelDatum::Ball1})
     if (text == name(datum)) {
       out.datum = datum;
       return;
     }
-  in.fault("datum", "must be \"G1\", \"G2\", \"Ball1-blocks\" or \"Ball1\"");
+  in.fault(key, "must be \"G1\", \"G2\", \"Ball1-blocks\" or \"Ball1\"");
 }
 
 calib::ModelDescription read_description(ModelReader& in) {

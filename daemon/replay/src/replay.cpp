@@ -358,10 +358,12 @@ class Replay : private PipelineObserver {
     if (!range) return ReplayReport{};
     begin_ = batch_.taken = range->first;
     report_.recorded = range->second - range->first;
+    const Error before_its_end{ErrorCode::DataInsufficient, "replay: stopped before its end"};
     take_messages(Pace{options_.speed, begin_});
+    if (stopped()) return tl::unexpected(before_its_end);
     pipeline_.finish(batch_.taken);
     report_.calibrations = calibrations_.finish();
-    if (stopped()) return fail(ErrorCode::DataInsufficient, "replay: stopped before its end");
+    if (stopped()) return tl::unexpected(before_its_end);
     if (bytes_) report_.zeros = marks_.compared(recording_);
     return std::move(report_);
   }

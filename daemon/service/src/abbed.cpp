@@ -1,5 +1,4 @@
 #include "abbe/service/abbed.hpp"
-#include "abbe/base/wall_clock.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -43,11 +43,6 @@ std::string held_text(const std::string& id) {
 // usually lasts until an operator acts.
 constexpr auto kStoreAgain = std::chrono::seconds{5};
 
-template <class T>
-bool ready(const std::future<T>& work) {
-  return work.valid() && work.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
-}
-
 }  // namespace
 
 CalibrationService::CalibrationService(const Config& config, ModelAuthority& authority,

@@ -21,7 +21,7 @@ class CountingUpkeep {
   /// The state of the previous run, if it can still be valid. Not after start().
   [[nodiscard]] const std::optional<CountingState>& left() const noexcept { return left_.state; }
 
-  /// Starts the thread. Both arguments must exist until end().
+  /// Starts the thread. `hub` must exist until end().
   void start(const Config& config, Hub& hub);
   /// The hub's thread has ended: the service for reference marks is used without it.
   void hub_ended() noexcept;

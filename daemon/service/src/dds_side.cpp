@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "abbe/base/account_names.hpp"
 #include "abbe/messages/dds_security.hpp"
 #include "abbe/result/try.hpp"
 #include "abbed_options.hpp"

@@ -16,8 +16,8 @@ class HubThread {
   HubThread& operator=(const HubThread&) = delete;
   ~HubThread() { end(); }
 
-  /// Starts the thread, which waits for run(). Io if the system refuses its priority; the thread
-  /// then has none. So a refusal is known before the hub exists.
+  /// Starts the thread, which waits for run(). Io if the system refuses its priority or its
+  /// processor; the thread then runs without what was refused.
   [[nodiscard]] Result<void> start(const DaemonConfig& config);
   /// Runs the hub on the thread. `hub` must exist until end().
   void run(Hub& hub) { hub_.set_value(&hub); }

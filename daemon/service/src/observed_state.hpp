@@ -6,7 +6,8 @@
 
 namespace abbe::daemon {
 
-/// Waits for the hub, Hub::kHangsAfter at most. `participant` is empty: the hub does not know it.
+/// Waits until the hub answers, Hub::kHangsAfter for it to begin. `participant` is empty: the hub
+/// does not know it.
 /// Any thread except the hub's.
 [[nodiscard]] Observed observed_state(Hub& hub);
 

@@ -1,12 +1,19 @@
 #pragma once
 /// The result of a background task, with an exception converted to an Error.
 
+#include <chrono>
 #include <exception>
 #include <future>
 
 #include "abbe/base/error.hpp"
 
 namespace abbe::daemon {
+
+/// True when outcome_of() need not wait. False if `work` is not valid.
+template <class T>
+[[nodiscard]] bool ready(const std::future<T>& work) {
+  return work.valid() && work.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
+}
 
 /// Waits for the task and returns its result. `work` must be valid, and is invalid afterwards.
 template <class T>

@@ -12,15 +12,6 @@
 #include "outcome.hpp"
 
 namespace abbe::daemon {
-namespace {
-
-template <class T>
-bool has_come(const std::future<T>& work) {
-  return work.valid() && work.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
-}
-
-}  // namespace
-
 std::string recording_name() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm utc{};
@@ -51,7 +42,7 @@ void RecordingUpkeep::cycle(WallTime now) {
 }
 
 void RecordingUpkeep::report_removed() {
-  if (!has_come(removing_)) return;
+  if (!ready(removing_)) return;
   const auto removed = outcome_of(removing_);
   if (!removed) fmt::print(stderr, "abbed: {}\n", removed.error().text);
   if (removed && !removed->empty())
@@ -76,7 +67,7 @@ void RecordingUpkeep::remove_old(WallTime now) {
 }
 
 void RecordingUpkeep::report_closed() {
-  if (!has_come(closing_)) return;
+  if (!ready(closing_)) return;
   const auto closed = outcome_of(closing_);
   if (!closed) return fmt::print(stderr, "abbed: {}\n", closed.error().text);
   for (const auto& left : *closed) {

@@ -58,7 +58,7 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
   std::vector<ReportSubject> models;
   for (const StoreEntry& entry : *entries) {
     if (!entry.fault.empty()) {
-      show_left_out(entry);
+      if (show_left_out) show_left_out(entry);
       continue;
     }
     if (entry.machine != subject.document.machine) continue;
@@ -192,15 +192,18 @@ Result<MadeReport> make_report(const ReportArguments& arguments, const ShowLeftO
 }
 
 Result<void> write_report(const MadeReport& report, const ShowWritten& show_written) {
+  const auto show = [&](const std::string& file) {
+    if (show_written) show_written(file);
+  };
   ABBE_TRY(replace_file(report.out, report.page));
-  show_written(report.out);
+  show(report.out);
   if (!report.dcc.empty()) {
     ABBE_TRY(replace_file(report.dcc, report.certificate));
-    show_written(report.dcc);
+    show(report.dcc);
   }
   if (report.pdf.empty()) return {};
   ABBE_TRY(write_pdf(report.page, report.pdf));
-  show_written(report.pdf);
+  show(report.pdf);
   return {};
 }
 

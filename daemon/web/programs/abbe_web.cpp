@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/message.hpp"
 #include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
@@ -30,6 +31,7 @@ using abbe::daemon::ExitCode;
 
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kInternal = number(ExitCode::Internal);
+constexpr std::chrono::seconds kReplayEnds{5};
 constexpr int kNice = 10;  ///< below abbed, which must not wait for a page
 constexpr std::chrono::hours kNoticePeriod{24};
 
@@ -153,7 +155,12 @@ int serve(const std::string& file) {
   abbe::daemon::notify_ready("serving");
   const int code = run_until_stop(stop, **page);
   abbe::daemon::notify_stopping();
-  page->reset();
+  {
+    // A replay writes nothing: it can end anywhere.
+    const abbe::daemon::ExitDeadline deadline(kReplayEnds, code,
+                                              "abbe-web: stopped before the end of a replay");
+    page->reset();
+  }
   log_line("stopped");
   return code;
 }

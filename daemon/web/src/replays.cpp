@@ -61,7 +61,7 @@ class EarlyEnd {
     if (now < next_memory_) return std::nullopt;
     next_memory_ = now + kMemoryPeriod;
     if (resident_bytes() > limits_.memory_bytes)
-      return fmt::format("abbe replay needed more than {} MiB of memory and was ended",
+      return fmt::format("abbe-web has more than {} MiB of memory: the replay was ended",
                          limits_.memory_bytes >> 20);
     return std::nullopt;
   }

@@ -44,11 +44,11 @@ TEST_F(OptionValues, AnEmptyValueIsNotAnAbsentOption) {
 }
 
 TEST_F(OptionValues, TheUnitOfAnOptionMayBeLeftOut) {
-  expect_usage_error("export m.json --format heidenhain --step ten -o out", "--step-mm");
-  expect_usage_error("export m.json --format heidenhain --step=ten -o out", "--step-mm");
-  expect_usage_error("export m.json --format heidenhain --stepp 10 -o out", "--stepp");
+  expect_usage_error("export m.json --to heidenhain-com --step ten -o out", "--step-mm");
+  expect_usage_error("export m.json --to heidenhain-com --step=ten -o out", "--step-mm");
+  expect_usage_error("export m.json --to heidenhain-com --stepp 10 -o out", "--stepp");
   // "--length" is no option of this command, with a unit or without.
-  expect_usage_error("export m.json --format heidenhain --length 10 -o out", "--length");
+  expect_usage_error("export m.json --to heidenhain-com --length 10 -o out", "--length");
 }
 
 TEST_F(OptionValues, EarlierNamesAreRead) {

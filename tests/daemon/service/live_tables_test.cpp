@@ -88,7 +88,7 @@ double largest_difference_in_u(const LiveTables& live, const calib::VolumetricMo
   return largest;
 }
 
-/// They differ by the samples near the corners, means of chunks, and the scatter of the alignment.
+/// They differ by the samples near the corners, means of segments, and the scatter of the alignment.
 TEST(LiveTables, OfACompleteRunAgreeWithItsModel) {
   LiveRun run(500);
   run.drive();

@@ -245,7 +245,8 @@ await withPage(url, out, async (context) => {
     faults.push(...await turns(context, size));
   }
   await resize(context, "desk");
+  await waitForText(context, "Log out", "#log-in");
   say(`views checked ${checked}`);
   return [...faults, ...await trends(context), ...await keyboard(context), ...await themes(context),
     ...await preferences(context)];
-}, { everySize: false });  // the views are shown in every size
+}, { everySize: false });  // the views are shown in their sizes

@@ -33,8 +33,8 @@ struct WithoutTouch {
 };
 [[nodiscard]] std::optional<WithoutTouch> without_touch(const ResidualsOfFeature&,
                                                         std::size_t place, const Matrix3& axes);
-/// Approximate direction of the axis, or outward normal, of a feature, in machine axes. `axes`: x, y
-/// and z of the bar as columns.
+/// Approximate direction of the axis, or outward normal, of a feature, in machine axes. `axes`: x,
+/// y and z of the bar as columns.
 [[nodiscard]] Vector3 near_direction(const ResidualsOfFeature&, const Matrix3& axes);
 
 }  // namespace abbe::calib::mfb

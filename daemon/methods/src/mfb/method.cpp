@@ -145,10 +145,12 @@ MfbMethod::Run MfbMethod::run_of(Acquisition&& acquisition) {
 Result<MfbMethod::Candidate> MfbMethod::identify(const Run& run, const Config& config,
                                                  const calib::VolumetricModel* active,
                                                  const IdentificationWatch& watch) {
+  const auto stopped = [&] { return watch.stopped && watch.stopped(); };
+  const Error before_its_end{ErrorCode::DataInsufficient, "identification: stopped before its end"};
+  if (stopped()) return tl::unexpected(before_its_end);
   auto candidate =
       identify_with_bar({.bar = run.bar, .plan = run.plan, .passes = run.passes}, config, active);
-  if (watch.stopped && watch.stopped())
-    return fail(ErrorCode::DataInsufficient, "identification: stopped before its end");
+  if (stopped()) return tl::unexpected(before_its_end);
   return candidate;
 }
 

@@ -47,7 +47,7 @@ class PipelineObserver {
 
 class Pipeline {
  public:
-  /// `zero`: null if the readings in the batches have their zero already, as in a recording.
+  /// `zeros`: null if the readings in the batches have their zero already, as in a recording.
   Pipeline(AssemblerOptions options, AxisZeros* zeros);
 
   /// The observer must outlive the pipeline.

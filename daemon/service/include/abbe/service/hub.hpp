@@ -93,11 +93,13 @@ class Hub : private PipelineObserver {
     return result;
   }
 
+  /// Any thread; the parts state themselves who may use them.
+  [[nodiscard]] const HubParts& parts() const noexcept { return parts_; }
+
   // The following functions may be called only by tasks on the hub's thread.
   [[nodiscard]] const LiveView& live() const noexcept { return live_; }
   [[nodiscard]] const std::vector<StreamHealth>& health() const noexcept { return health_; }
   [[nodiscard]] ActiveModelState model_state() const;
-  [[nodiscard]] const HubParts& parts() const noexcept { return parts_; }
 
  private:
   struct Call;

@@ -41,8 +41,10 @@ struct VerifyArguments {
   bool other_machine = false;
 };
 
-/// One model, or several at the same points, for example of runs at several feeds. Usage: an
-/// argument that is for one model; different tool offsets of the models without `arguments.tool`.
+/// One model, or several at the same points, for example of runs at several feeds. Usage: no
+/// model, not exactly one source of points, live points without `out`, a vector that is none, models
+/// of different machines without `other_machine`, an argument that is for one model, different tool
+/// offsets of the models without `arguments.tool`.
 /// DataInsufficient: fewer than 4 places inside the validity volume of all models. Sets `cut_short`
 /// if points are missing, even if the comparison fails: the missing points may be the cause of its
 /// failure. With several models it is not set if the points alone contradict each other.

@@ -17,12 +17,13 @@
 
 namespace abbe::web {
 
-/// A replay that exceeds one of them ends and has failed.
+/// A replay that exceeds one of them ends and has failed, at the latest when the identification
+/// with a bar or an array that is under way has ended.
 struct ReplayLimits {
   std::chrono::minutes time{60};
-  /// Resident memory of the whole process: below MemoryMax of abbe-web.service, so that a replay
-  /// ends before the kernel ends abbe-web.
-  std::uint64_t memory_bytes = std::uint64_t{1536} << 20;
+  /// Resident memory of the whole process, looked at between the steps of a replay: far below
+  /// MemoryMax of abbe-web.service, so that a replay ends before the kernel ends abbe-web.
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;
 };
 
 class Replays {

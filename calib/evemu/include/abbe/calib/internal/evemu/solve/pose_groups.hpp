@@ -35,8 +35,8 @@ struct PoseGroupOptions {
 };
 
 /// One group per position, in the order of the positions. Unknowns: those of the design, then one
-/// error of the array per column of artefact_rows(), each with standard deviation 1 (the caller adds
-/// their prior). Errors: BadInput for an s that is not positive; those of fit_rigid().
+/// error of the array per column of artefact_rows(), each with standard deviation 1 (the caller
+/// adds their prior). Errors: BadInput for an s that is not positive; those of fit_rigid().
 [[nodiscard]] Result<std::vector<estimation::ObservationGroup>> pose_groups(
     const Observations&, const VolumetricDesign&, const PoseGroupOptions&);
 

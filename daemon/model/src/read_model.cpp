@@ -115,7 +115,7 @@ void read_covariance(ModelReader& in, calib::ModelDescription& out) {
 
 void read_datum(ModelReader& in, calib::ModelDescription& out) {
   // "gauge": the earlier name
-  const std::string_view key = in.has("gauge") ? "gauge" : "datum";
+  const std::string key = in.has("gauge") ? "gauge" : "datum";
   const auto text = in.text(key);
   for (const auto datum : {calib::ModelDatum::G1, calib::ModelDatum::G2,
                            calib::ModelDatum::Ball1Blocks, calib::ModelDatum::Ball1})

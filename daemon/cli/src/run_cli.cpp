@@ -16,7 +16,6 @@
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/option_values.hpp"
-#include "abbe/protocol/option_words.hpp"
 #include "commands.hpp"
 #include "dds_keys.hpp"
 #include "earlier_words.hpp"
@@ -140,7 +139,7 @@ int parse_and_run(const std::vector<std::string>& words) {
   }
 
   try {
-    app.parse(protocol::option_words(app, present_options(words)));
+    app.parse(option_words(app, present_options(words)));
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {

@@ -24,7 +24,6 @@
 #include "abbe/dds/participant_addresses.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
-#include "abbe/protocol/option_words.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/settings/dds_config.hpp"
 #include "watched_machines.hpp"
@@ -276,7 +275,7 @@ int main(int argc, char** argv) {
 
   try {
     daemon::check_option_values(app);
-    app.parse(protocol::option_words(app, {argv + 1, argv + argc}));
+    app.parse(daemon::option_words(app, {argv + 1, argv + argc}));
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }

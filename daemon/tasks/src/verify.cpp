@@ -177,15 +177,13 @@ Result<Verification> verify_models(const VerifyArguments& arguments,
     v.planes_m = *planes;
   }
 
-  const bool several = v.models.size() > 1;
   const auto points = points_for(v, arguments, progress);
   ABBE_TRY(points);
-  if (!several) cut_short = points->cut_short;
+  cut_short = points->cut_short;
   auto observed = observed_in(arguments, points->file);
   ABBE_TRY(observed);
-  cut_short = points->cut_short;
   v.observations = std::move(*observed);
-  ABBE_TRY(several ? compare_each(v) : compare_one(v, points->file, *options));
+  ABBE_TRY(v.models.size() > 1 ? compare_each(v) : compare_one(v, points->file, *options));
   return v;
 }
 

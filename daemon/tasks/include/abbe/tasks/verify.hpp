@@ -47,7 +47,7 @@ struct VerifyArguments {
 /// offsets of the models without `arguments.tool`.
 /// DataInsufficient: fewer than 4 places inside the validity volume of all models. Sets `cut_short`
 /// if points are missing, even if the comparison fails: the missing points may be the cause of its
-/// failure. With several models it is not set if the points alone contradict each other.
+/// failure.
 [[nodiscard]] Result<Verification> verify_models(const VerifyArguments& arguments,
                                                  std::optional<Error>& cut_short,
                                                  const Progress& progress);

@@ -20,23 +20,24 @@ Result<void> check_group(const ObservationGroup& b, std::size_t unknowns) {
                      (nuisances == 0 || b.L.rows() == rows) && b.covariance.rows() == rows &&
                      (b.covariance.cols() == rows || b.covariance.cols() == 1);
   if (!sizes) {
-    return failure(
-        ErrorCode::BadInput,
-        message("group: ", rows, " observations, A ", b.A.rows(), " x ", b.A.cols(), " for ",
-                columns, " unknowns, L ", b.L.rows(), " x ", b.L.cols(), " for ", nuisances,
-                " nuisances, covariance ", b.covariance.rows(), " x ", b.covariance.cols()));
+    return failure(ErrorCode::BadInput,
+                   message("observation group: ", rows, " observations, A ", b.A.rows(), " x ",
+                           b.A.cols(), " for ", columns, " unknowns, L ", b.L.rows(), " x ",
+                           b.L.cols(), " for ", nuisances, " nuisances, covariance ",
+                           b.covariance.rows(), " x ", b.covariance.cols()));
   }
 
   for (const std::size_t unknown : b.unknowns) {
     if (unknown >= unknowns) {
-      return failure(ErrorCode::BadInput, message("group: unknown ", unknown, " of ", unknowns));
+      return failure(ErrorCode::BadInput,
+                     message("observation group: unknown ", unknown, " of ", unknowns));
     }
   }
 
   for (const double u : b.u_nuisance) {
     if (!(u > 0.0)) {
-      return failure(ErrorCode::BadInput,
-                     message("group: prior uncertainty ", u, " of a nuisance must be positive"));
+      return failure(ErrorCode::BadInput, message("observation group: prior uncertainty ", u,
+                                                  " of a nuisance must be positive"));
     }
   }
 
@@ -48,7 +49,8 @@ Result<void> check_group(const ObservationGroup& b, std::size_t unknowns) {
 Result<void> whiten(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& rows) {
   if (covariance.cols() == 1) {
     if (!(covariance.minCoeff() > 0.0)) {
-      return failure(ErrorCode::DegenerateGeometry, "group: a variance is not positive");
+      return failure(ErrorCode::DegenerateGeometry,
+                     "observation group: a variance is not positive");
     }
     rows.array().colwise() /= covariance.col(0).array().sqrt();
     return {};
@@ -56,8 +58,9 @@ Result<void> whiten(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& rows) {
 
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) {
-    return failure(ErrorCode::DegenerateGeometry,
-                   "group: the covariance of the observations is not positive definite");
+    return failure(
+        ErrorCode::DegenerateGeometry,
+        "observation group: the covariance of the observations is not positive definite");
   }
   factor.matrixL().solveInPlace(rows);
   return {};

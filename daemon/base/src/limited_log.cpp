@@ -2,19 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <map>
 
 namespace abbe::daemon {
-namespace {
-
-std::string without_controls(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
-  return text;
-}
-
-}  // namespace
-
 void LimitedLog::line(const std::string& subject, const std::string& text, Clock::time_point now) {
   std::size_t left_out = 0;
   {
@@ -34,12 +24,7 @@ void LimitedLog::line(const std::string& subject, const std::string& text, Clock
     ++period.written;
     left_out = std::exchange(period.left_out, 0);
   }
-  write_(without_controls(text) +
-         (left_out > 0 ? fmt::format(" ({} more in between)", left_out) : ""));
-}
-
-void LimitedLog::always(const std::string& text) {
-  write_(without_controls(text));
+  write_(left_out > 0 ? fmt::format("{} ({} more in between)", text, left_out) : text);
 }
 
 }  // namespace abbe::daemon

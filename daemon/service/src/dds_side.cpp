@@ -8,6 +8,7 @@
 #include "abbe/base/account_names.hpp"
 #include "abbe/messages/dds_security.hpp"
 #include "abbe/result/try.hpp"
+#include "abbe/service/abbed.hpp"
 #include "abbed_options.hpp"
 
 namespace abbe::daemon {

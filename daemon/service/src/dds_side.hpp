@@ -13,10 +13,11 @@
 #include "abbe/config/config.hpp"
 #include "abbe/publishing/dds_supervisor.hpp"
 #include "abbe/publishing/publisher.hpp"
-#include "abbe/service/abbed.hpp"
 #include "abbe/service/state_observer.hpp"
 
 namespace abbe::daemon {
+
+struct AbbedOptions;
 
 class DdsSide {
  public:

@@ -21,7 +21,7 @@ class HubThread {
   [[nodiscard]] Result<void> start(const DaemonConfig& config);
   /// Runs the hub on the thread. `hub` must exist until end().
   void run(Hub& hub) { hub_.set_value(&hub); }
-  /// Waits for the end of the thread; the hub must have been told to stop. No effect without one.
+  /// Waits for the end of the thread, after Hub::stop(). Does nothing if it was not started.
   void end();
 
  private:

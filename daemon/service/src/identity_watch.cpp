@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "abbe/service/background_tasks.hpp"
+#include "outcome.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -55,7 +56,7 @@ IdentityWatch IdentityWatch::open(const std::filesystem::path& data_dir, const C
 
 void IdentityWatch::follow(WallTime now) {
   if (reading_.valid()) {
-    if (reading_.wait_for(std::chrono::seconds{0}) != std::future_status::ready) return;
+    if (!ready(reading_)) return;
     try {
       auto read = reading_.get();
       // What is known stays while the disk does not answer: the identity that is published, and why

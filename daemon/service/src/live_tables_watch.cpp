@@ -5,6 +5,7 @@
 
 #include "abbe/methods/otf/live_tables.hpp"
 #include "abbe/service/background_tasks.hpp"
+#include "outcome.hpp"
 
 namespace abbe::daemon {
 
@@ -36,7 +37,7 @@ void LiveTablesWatch::cycle(CalibrationSession& session, protocol::HostTime now)
   if (session.status().id != session_) forget();
   session_ = session.status().id;
   if (task_.valid()) {
-    if (task_.wait_for(std::chrono::seconds{0}) == std::future_status::ready) take_result();
+    if (ready(task_)) take_result();
     return;
   }
 

@@ -100,8 +100,7 @@ std::shared_ptr<const PublishedModel> ModelAuthority::comparison_model() const {
 
 ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
   if (!looking_.valid()) begin_to_look(now);
-  if (looking_.wait_for(std::chrono::seconds{0}) == std::future_status::ready)
-    return conclude_look(outcome_of(looking_), now);
+  if (ready(looking_)) return conclude_look(outcome_of(looking_), now);
   if (now - looking_from_ > kStoreTimeout)
     fault_ = fmt::format("the model store has not answered for {} s", kStoreTimeout.count());
   return Following::Reading;

@@ -7,8 +7,7 @@
 namespace abbe::daemon {
 
 /// Waits until the hub answers, Hub::kHangsAfter for it to begin. `participant` is empty: the hub
-/// does not know it.
-/// Any thread except the hub's.
+/// does not know it. Any thread except the hub's.
 [[nodiscard]] Observed observed_state(Hub& hub);
 
 }  // namespace abbe::daemon

@@ -12,6 +12,7 @@
 #include "outcome.hpp"
 
 namespace abbe::daemon {
+
 std::string recording_name() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm utc{};

@@ -38,7 +38,7 @@ std::optional<RecordingAttachment> SensorUpkeep::left(std::vector<std::string>& 
 
 void SensorUpkeep::cycle(WallTime now, Hub& hub) {
   if (writing_.valid()) {
-    if (writing_.wait_for(std::chrono::seconds{0}) != std::future_status::ready) return;
+    if (!ready(writing_)) return;
     take_outcome();
   }
   if (now < next_) return;

@@ -41,7 +41,7 @@ Result<std::uint64_t> StoreChanges::roll_back(RollBack asked) {
 
 Result<std::uint64_t> StoreChanges::begin(Change change) {
   const std::lock_guard lock(mutex_);
-  if (running_.valid() && running_.wait_for(std::chrono::seconds{0}) != std::future_status::ready)
+  if (running_.valid() && !ready(running_))
     return fail(ErrorCode::Refused,
                 fmt::format("change {} of the model store is not done yet: try again in some "
                             "seconds",

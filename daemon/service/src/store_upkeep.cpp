@@ -35,7 +35,7 @@ Result<std::vector<std::string>> keep_up(const std::filesystem::path& folder,
 }  // namespace
 
 void StoreUpkeep::cycle(WallTime now) {
-  if (work_.valid() && work_.wait_for(0s) == std::future_status::ready) {
+  if (ready(work_)) {
     const auto removed = outcome_of(work_);
     if (!removed)
       fmt::print(stderr, "abbed: upkeep of the model store: {}\n", removed.error().text);

@@ -149,7 +149,7 @@ Result<void> check_files(const ReportArguments& arguments, const std::string& ou
   return {};
 }
 
-/// Without what the model itself has: nobody can correct it, and the report states it.
+/// Without the dates of the model itself: they cannot be corrected, and the report states them.
 Result<void> check_dates(const ReportSubject& subject) {
   auto wrong = contradictory_dates(subject, nullptr);
   const auto of_model = contradictory_times(subject);

@@ -16,9 +16,9 @@ TEST(LimitedLog, CountsLinesOfASubjectBeyondItsLimitAndStatesTheirNumber) {
                  {.lines = 2, .period = std::chrono::minutes{1}});
   const LimitedLog::Clock::time_point now{std::chrono::hours{1}};
   for (int i = 0; i < 9; ++i) log.line("client", "client", now);
-  log.line("other", "other\n", now);
+  log.line("other", "other", now);
   log.always("always");
-  EXPECT_THAT(written, ElementsAre("client", "client", "other?", "always"));
+  EXPECT_THAT(written, ElementsAre("client", "client", "other", "always"));
 
   written.clear();
   log.line("client", "later", now + std::chrono::minutes{1});

@@ -12,8 +12,8 @@ namespace abbe::daemon {
 
 /// Lines for the log about clients: one that connects again and again must not fill the journal. Of
 /// each subject a number of lines in a period is written, and the number of those that were left
-/// out is added to the next one. Control characters, which a client may have sent, become "?".
-/// Thread-safe.
+/// out is added to the next one. `Write` escapes what a client may have sent, as print_message()
+/// does. Thread-safe.
 class LimitedLog {
  public:
   using Clock = std::chrono::steady_clock;
@@ -29,7 +29,7 @@ class LimitedLog {
   void line(const std::string& subject, const std::string& text,
             Clock::time_point now = Clock::now());
   /// A line that is never left out.
-  void always(const std::string& text);
+  void always(const std::string& text) { write_(text); }
 
  private:
   struct Period {

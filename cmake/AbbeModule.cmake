@@ -75,6 +75,10 @@ endfunction()
 #   has the result. With ThreadSanitizer an identification would take minutes. Such a target must not
 #   use std::shared_ptr: the linker may keep its copy of the reference counter for the whole program,
 #   and ThreadSanitizer, which does not see this copy, reports races where there are none.
+# - Products and decompositions take five times as long with AddressSanitizer. A target of
+#   `calib` is compiled without it unless ABBE_SANITIZE_CALIB is set, as `scripts/nightly calib`
+#   does. The assertions of Eigen and of the C++ library, which test every index, and UBSan stay on.
+option(ABBE_SANITIZE_CALIB "Compile calib and its tests with AddressSanitizer, too" OFF)
 function(abbe_compile_mathematics target)
   if(ABBE_SANITIZE MATCHES "undefined")
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,pointer-overflow)
@@ -82,6 +86,14 @@ function(abbe_compile_mathematics target)
   get_target_property(options ${target} COMPILE_OPTIONS)
   list(REMOVE_ITEM options ${abbe_observing_options})
   set_property(TARGET ${target} PROPERTY COMPILE_OPTIONS ${options})
+endfunction()
+
+function(abbe_compile_calib target)
+  abbe_compile_mathematics(${target})
+  if(ABBE_SANITIZE MATCHES "address" AND NOT ABBE_SANITIZE_CALIB)
+    target_compile_options(${target} PRIVATE -fno-sanitize=address)
+    target_compile_definitions(${target} PRIVATE _GLIBCXX_ASSERTIONS)
+  endif()
 endfunction()
 
 # GCC warns about types in the unnamed namespaces of source files that another source file includes

@@ -14,7 +14,7 @@
 #include "abbe/base/refusal.hpp"
 #include "abbe/base/units.hpp"
 #include "follow.hpp"
-#include "remaining_time.hpp"
+#include "session_words.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -85,7 +85,7 @@ std::string with_remaining_time(const std::string& state, const json& session) {
   return remaining.empty() ? state : fmt::format("{}, {}", state, remaining);
 }
 
-/// Prints one line whenever state or reason of the session change, for example "warming: waiting
+/// Prints one line whenever state or reason of the session change, for example "start: waiting
 /// for the machine to stand at ...", and one line per new note. Prints the tables whenever the run
 /// determines more of them than printed before. Once it determines all, also whenever the largest u
 /// in um or that in urad is less than half of that printed before.
@@ -158,9 +158,10 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
       bar.clear();
       return print_session_verdict(session, as_json);
     }
-    log.print_state(bar, state, session["reason"]);
+    log.print_state(bar, state_in_words(session), session["reason"]);
     log.print_tables(bar, session);
-    bar.show(with_remaining_time(state, session), session["progress"].get<double>());
+    bar.show(with_remaining_time(state_in_words(session), session),
+             session["progress"].get<double>());
     return std::nullopt;
   };
 

@@ -16,7 +16,7 @@
 #include "abbe/base/units.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
-#include "remaining_time.hpp"
+#include "session_words.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -115,6 +115,16 @@ void print_next(const json& next) {
                              : fmt::format("position {}", next["position"].get<int>());
   fmt::print("next       {} of {}, {} of {} points touched\n", next["on"].get<std::string>(), of,
              next["touched"].get<std::size_t>(), next["points"].get<std::size_t>());
+}
+
+/// What holds of the conditions under which the machine may drive off, and what does not.
+void print_start(const json& start) {
+  for (const json& condition : start["conditions"]) {
+    const bool met = condition["met"];
+    fmt::print("           {} {}\n",
+               coloured(met ? "yes" : "NO ", met ? kGreen : kRed, STDOUT_FILENO),
+               condition["text"].get<std::string>());
+  }
 }
 
 /// "EXX  12.3 um at 150 mm (u 0.4)"; "EXX  not yet determined (4 of 13 nodes)".
@@ -217,11 +227,12 @@ void print_status(const json& status) {
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
   if (status.contains("machine_stop")) print_machine_stop(status["machine_stop"]);
   const json& session = status["session"];
-  fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
+  fmt::print("session    {}, {:.0f} %, {} points: {}\n", state_in_words(session),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
              session["reason"].get<std::string>());
   if (const auto remaining = remaining_time(session); !remaining.empty())
     fmt::print("           {}\n", remaining);
+  if (session.contains("start")) print_start(session["start"]);
   if (session.contains("next")) print_next(session["next"]);
   if (session.contains("live")) print_live(session["live"]);
   for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());

@@ -111,7 +111,10 @@ void CalibrationSession::follow_acquisition(HostTime now) {
       [this](auto& a) {
         status_.progress = a.progress();
         status_.points = a.points();
-        if constexpr (kLive<decltype(a)>) status_.remaining = a.remaining();
+        if constexpr (kLive<decltype(a)>) {
+          status_.remaining = a.remaining();
+          if (const StartCheck* check = a.start()) status_.start = check->state();
+        }
         return std::pair{a.phase(), a.reason()};
       },
       *acquisition_);
@@ -121,6 +124,11 @@ void CalibrationSession::follow_acquisition(HostTime now) {
         if constexpr (kGuided<decltype(acquisition)>) follow_guidance(acquisition, now);
       },
       *acquisition_);
+
+  const bool same_state =
+      phase == (stage_ == SessionStage::Warming ? AcquisitionPhase::WaitingAtStart
+                                                : AcquisitionPhase::Running);
+  if (same_state && reason != status_.reason) add_event(reason, now);
 
   switch (phase) {
     case AcquisitionPhase::WaitingAtStart:
@@ -137,8 +145,8 @@ void CalibrationSession::follow_acquisition(HostTime now) {
   }
 }
 
-/// Adds the notes first and then the next instruction. Both are events, so that subscribers receive
-/// them in this order.
+/// Adds the notes; the caller adds the next instruction. Both are events, so that subscribers
+/// receive them in this order.
 template <class Guided>
 void CalibrationSession::follow_guidance(Guided& acquisition, HostTime now) {
   const auto notes = acquisition.take_notes();
@@ -155,10 +163,6 @@ void CalibrationSession::follow_guidance(Guided& acquisition, HostTime now) {
   }
 
   status_.next = acquisition.next();
-  const bool same_state =
-      acquisition.phase() == (stage_ == SessionStage::Warming ? AcquisitionPhase::WaitingAtStart
-                                                              : AcquisitionPhase::Running);
-  if (same_state && acquisition.reason() != status_.reason) add_event(acquisition.reason(), now);
 }
 
 std::optional<RunNews> CalibrationSession::take_news() {
@@ -240,6 +244,7 @@ bool CalibrationSession::go(SessionStep step, HostTime now) {
 bool CalibrationSession::enter(SessionStep step, std::string reason, HostTime now) {
   if (!go(step, now)) return false;
   if (stage_ != SessionStage::Acquiring) status_.remaining.reset();
+  if (stage_ != SessionStage::Warming) status_.start.reset();
   if (has_ended(stage_)) {
     status_.progress = 1.0;
     status_.next.reset();

@@ -114,6 +114,13 @@ json live_json(const LiveTables& live) {
           {"tables", std::move(tables)}};
 }
 
+json start_json(const StartState& start) {
+  json conditions = json::array();
+  for (const StartCondition& c : start.conditions)
+    conditions.push_back({{"name", c.name}, {"met", c.met}, {"text", c.text}});
+  return {{"ready", start.ready}, {"missed", start.missed}, {"conditions", std::move(conditions)}};
+}
+
 json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
   json out{{"id", s.id},
            {"state", name(s.state)},
@@ -127,6 +134,7 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
   if (s.state == SessionState::Refused) out["code"] = code_name(s.refused_as);
   if (s.next) out["next"] = next_json(*s.next);
   if (s.remaining) out["remaining_s"] = in_seconds(*s.remaining);
+  if (s.start) out["start"] = start_json(*s.start);
   if (s.live) out["live"] = live_json(*s.live);
 
   if (held_out) {

@@ -4,9 +4,10 @@ import { ask } from "./ask.js";
 import { fixed, h, list, table } from "./dom.js";
 import { get, listen, post, state } from "./server.js";
 import { message, withdraw } from "./message.js";
+import { methodInWords, running, stateInWords } from "./session_words.js";
+import { signalSwitch } from "./signals.js";
 import { Space } from "./space.js";
 
-const running = (session) => ["warming", "acquiring", "identifying", "judged"].includes(session.state);
 const may = () => ["calibrate", "administer"].includes(state.me.role);
 
 /** What a calibration with touches asks for next. */
@@ -15,9 +16,23 @@ function nextTouch(next) {
   const of = next.measurement ? `measurement ${next.measurement}` : `position ${next.position}`;
   const features = next.features ?? [];
   const touched = features.filter((f) => f.touched >= f.points).length;
-  return [h("p", {}, h("strong", {}, `Next: ${next.on}`), ` of ${of}; `,
-    `${next.touched} of ${next.points} points touched`,
-    features.length ? `; ${touched} of ${features.length} balls and blocks of this position are complete` : "")];
+  return [h("p", { class: "large" }, `Next: ${next.on}`),
+    h("p", {}, `${of}, ${next.touched} of ${next.points} points touched`,
+      features.length ? `, ${touched} of ${features.length} balls and blocks of this position complete` : "")];
+}
+
+/** What a run along a path needs before the machine may drive off. */
+function startParts(session) {
+  const { start } = session;
+  if (!start) return [h("p", {}, session.reason)];
+  return [
+    start.ready ? h("p", { class: "large good", role: "status" }, session.reason) : null,
+    start.missed ? h("p", { class: "alarm", role: "alert" }, session.reason) : null,
+    !start.ready && !start.missed ? h("p", {}, session.reason) : null,
+    h("ul", { class: "checks", id: "start" }, start.conditions.map((c) =>
+      h("li", { class: c.met ? "good" : "warn", "data-name": c.name, "data-met": String(c.met) },
+        h("strong", {}, c.met ? "\u2713 " : "\u2717 "), c.text))),
+  ];
 }
 
 function liveTables(live) {
@@ -39,9 +54,9 @@ function sessionParts(session) {
   const minutes = session.remaining_s === undefined ? "" : `, about ${fixed(session.remaining_s / 60, 1)} min left`;
   const held = session.held_out_rms_um;
   return [
-    h("p", {}, h("strong", {}, session.state), ` (${session.method}), ${session.points} points${minutes}`),
+    h("p", {}, h("strong", {}, stateInWords(session)), ` (${methodInWords(session)}), ${session.points} points${minutes}`),
     running(session) ? h("progress", { max: 1, value: session.progress, "aria-label": "progress" }) : null,
-    h("p", {}, session.reason),
+    ...startParts(session),
     held ? h("p", {}, `Held-out residuals: ${fixed(held.candidate, 3)} um with the model, ` +
       `${fixed(held.no_compensation, 3)} um without.`) : null,
     ...nextTouch(session.next),
@@ -342,9 +357,18 @@ function fieldsOf(method) {
       "Standard uncertainty of that V, um"), u], read: () => Number(u.value) } };
 }
 
-function controls() {
-  if (!may())
-    return h("p", { class: "weak" }, "To begin or cancel a calibration, log in with the role calibrate.");
+/** The button that ends the running calibration; above the view, so that a hand finds it. */
+function cancelButton() {
+  const cancel = async () => {
+    const sure = await ask({ title: "Cancel the running calibration?", yes: "Cancel the calibration",
+      lines: ["What is recorded stays in its recording."] });
+    if (sure !== null) await attempt(() => post("api/cancel"), "The calibration is cancelled.");
+  };
+  return h("p", { class: "tools" },
+    h("button", { type: "button", onclick: cancel }, "Cancel the calibration"));
+}
+
+function newCalibration() {
   const method = h("select", { id: "method" },
     h("option", { value: "otf" }, "on the fly with a laser tracker"),
     h("option", { value: "evemu" }, "ball array"),
@@ -362,25 +386,30 @@ function controls() {
     for (const [name, field] of Object.entries(fields)) request[name] = await field.read();
     await post("api/calibrate", request);
   }, begun[method.value]);
-  const cancel = async () => {
-    const sure = await ask({ title: "Cancel the running calibration?", yes: "Cancel the calibration",
-      lines: ["What is recorded stays in its recording."] });
-    if (sure !== null) await attempt(() => post("api/cancel"), "The calibration is cancelled.");
-  };
   return h("section", {}, h("h2", {}, "New calibration"),
     h("label", { for: "method" }, "Method"), method, place,
     h("p", { class: "tools" },
-      h("button", { type: "button", class: "strong", onclick: begin }, "Begin"),
-      h("button", { type: "button", onclick: cancel }, "Cancel the calibration")));
+      h("button", { type: "button", class: "strong", onclick: begin }, "Begin")));
 }
 
 export async function show(place) {
-  const parts = h("div"), view = h("div");
-  place.append(h("h2", {}, "Session"), parts, view, controls());
+  const parts = h("div"), view = h("div"), above = h("div"), below = h("div");
+  place.append(h("h2", {}, "Calibration"), above, parts, view, below, signalSwitch());
+  let shownControls = null;
+  // Cancel while a calibration runs, Begin while none does.
+  const showControls = (isRunning) => {
+    if (isRunning === shownControls) return;
+    shownControls = isRunning;
+    above.replaceChildren(...(isRunning && may() ? [cancelButton()] : []));
+    below.replaceChildren(isRunning ? "" : may() ? newCalibration()
+      : h("p", { class: "weak" }, "To begin or cancel a calibration, log in with the role calibrate."));
+  };
+  showControls(state.status ? running(state.status.session) : false);
   let before = state.status?.session.state;
   const onStatus = (status) => {
     if (!status) return;
     const now = status.session.state;
+    showControls(running(status.session));
     // Twice a second: "warming" may lie between two.
     if (["acquiring", "identifying"].includes(now) || (before === "warming" && now !== before))
       withdraw(Object.values(begun));

@@ -3,6 +3,8 @@
 import { h } from "./dom.js";
 import { message } from "./message.js";
 import { connect, disconnect, get, listen, post, state } from "./server.js";
+import { stateInWords } from "./session_words.js";
+import "./signals.js";
 
 const views = {
   live: () => import("./live.js"),
@@ -82,8 +84,8 @@ listen("status", (status) => {
   find("model-state").replaceChildren("Model ", h("strong", { class: good }, model.state));
   find("model-state").title = model.reason;
   const session = status.session;
-  find("session-state").textContent = `Session ${session.state}` +
-    (session.state === "acquiring" ? ` ${Math.round(100 * session.progress)} %` : "");
+  find("session-state").textContent = `Calibration: ${stateInWords(session)}`;
+  find("session-state").dataset.state = session.state;
 });
 
 function showUser() {

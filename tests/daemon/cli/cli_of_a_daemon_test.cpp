@@ -64,7 +64,7 @@ TEST_F(CliOfADaemon, CalibratePrintsWhatEveryStepWaitsFor) {
   ASSERT_TRUE(daemon);
   const auto ran = calibrate(socket);
   EXPECT_EQ(ran.exit, 0) << ran.err;
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("warming: waiting for the machine to stand at (1.000"),
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("start: waiting for the machine to stand at (1.000"),
                              HasSubstr("acquiring: driving the path")));
   EXPECT_THAT(ran.out, StartsWith("active abcd"));
 }

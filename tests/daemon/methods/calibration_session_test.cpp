@@ -15,6 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostTime;
 using Drive = test::SessionDrive;
+using ::testing::ElementsAre;
+using ::testing::StartsWith;
 
 const std::vector<AxisPosition> kPath{{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0.1, 0.1, 0.1}};
 
@@ -28,6 +30,41 @@ TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
   EXPECT_EQ(session.status().state, SessionState::Acquiring);
   drive.stand(kPath.back(), 2s);
   EXPECT_EQ(session.status().state, SessionState::Identifying);
+}
+
+/// The reasons of the events so far.
+std::vector<std::string> told_by(CalibrationSession& session) {
+  std::vector<std::string> told;
+  for (const SessionEvent& event : session.take_events()) told.push_back(event.status.reason);
+  return told;
+}
+
+TEST(CalibrationSession, TellsWhenTheMachineMayDriveOff) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand({0.05, 0.05, 0}, 1s);
+  ASSERT_TRUE(session.status().start);
+  EXPECT_FALSE(session.status().start->ready);
+  drive.stand(kPath[0], 1s);
+  EXPECT_TRUE(session.status().start->ready);
+  EXPECT_THAT(told_by(session), ElementsAre(StartsWith("waiting for the machine to stand"),
+                                            "READY: drive the path now"));
+  drive.move(kPath[1]);
+  EXPECT_FALSE(session.status().start);
+  EXPECT_THAT(told_by(session), ElementsAre("driving the path"));
+}
+
+TEST(CalibrationSession, TellsAtOnceThatTheStartWasMissed) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 100ms);
+  drive.move({0.02, 0, 0});
+  ASSERT_EQ(session.status().state, SessionState::Warming);
+  EXPECT_TRUE(session.status().start->missed);
+  EXPECT_THAT(told_by(session),
+              ElementsAre(StartsWith("waiting"), StartsWith("start missed: the machine has left")));
 }
 
 std::string reason_of_a_run_along(const std::vector<AxisPosition>& file,

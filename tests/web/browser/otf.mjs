@@ -24,8 +24,9 @@ await withPage(url, out, async (context) => {
   await goTo(context, "calibration");
   await chooseFile(context, "#path-file", path);
   await clickButton(context, "Begin");
-  await waitForText(context, "warming", "#session-state");
   await page.waitForSelector(".space canvas");
+  await waitForText(context, "READY: drive the path now", "#view");
+  await screenshot(context, "otf-ready");
   const faults = await violations(context);
   say("BEGUN");
 

@@ -71,11 +71,13 @@ OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOpti
       path_(otf_path(path_m_)),
       driven_at_m_(calib::otf::lengths_to_vertices_m(path_.path())),
       options_(std::move(options)),
-      mode_(mode) {
-  reason_ =
-      fmt::format("waiting for the machine to stand at {} for {:.1f} s with the tracker streaming",
-                  text(path_.path().vertices_m.front()), in_seconds(options_.stand_before));
-}
+      mode_(mode),
+      start_({.first_m = path_.path().vertices_m.at(0),
+              .second_m = path_.path().vertices_m.at(1),
+              .vertex_tolerance_m = options_.vertex_tolerance_m,
+              .path_tolerance_m = options_.path_tolerance_m,
+              .stand_before = options_.stand_before}),
+      reason_(start_.text()) {}
 
 double OtfAcquisition::progress() const noexcept {
   if (phase_ == Phase::Complete) return 1.0;
@@ -130,8 +132,11 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   give_up_if_stuck(point.time);
 
   // A point without axis positions is kept in its place of the sequence, but not evaluated further.
+  const auto flags = snapshot.tracker_point.head.flags;
+  const bool settled = !has(flags, SampleFlag::ClockUnsettled);
   if (!has_linear_axes(snapshot)) {
     if (phase_ == Phase::Running) keep(point);
+    if (phase_ == Phase::WaitingAtStart) check_start(point, settled, std::nullopt);
     return;
   }
 
@@ -140,7 +145,9 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   if (phase_ == Phase::WaitingAtStart) {
     compare_with_path(snapshot, q);
     wait_at_start(point, q);
-    if (stand_since_ == point.time && phase_ == Phase::WaitingAtStart) readings_.forget();
+    if (phase_ != Phase::WaitingAtStart) return;
+    if (stand_since_ == point.time) readings_.forget();
+    check_start(point, settled, q);
   } else if (phase_ == Phase::Running) {
     if (const auto effect = effect_of(snapshot, options_.environment)) environment_.take(*effect);
     temperatures_.take(snapshot);
@@ -185,7 +192,19 @@ void OtfAcquisition::tick(HostTime now) {
                      in_seconds(now - last_time_)));
   } else if (phase_ == Phase::WaitingAtStart) {
     give_up_if_stuck(now - options_.arrival_time_out);
+    if (phase_ != Phase::WaitingAtStart) return;
+    start_.tick(now);
+    reason_ = start_.text();
   }
+}
+
+void OtfAcquisition::check_start(const RunPoint& point, bool settled,
+                                 const std::optional<Vector3>& q) {
+  const auto stood =
+      before_.empty() ? std::chrono::nanoseconds{} : before_.back().time - before_.front().time;
+  start_.take(
+      {.time = point.time, .usable = point.usable, .settled = settled, .q_m = q, .stood = stood});
+  reason_ = start_.text();
 }
 
 /// False if the device time of the point is not later than that of the previous point. Such a point

@@ -159,7 +159,8 @@ std::string path_program(const calib::otf::Path& path, const calib::otf::Drive& 
                                    duration_s(path, drive) + 2.0 * stand_s)),
        program.comment("machine coordinates; the whole travel must be free; no tool offset"),
        program.move(path.vertices_m.front(), feed),
-       program.comment("start abbe calibrate otf, continue when it waits for the first leg"),
+       program.comment(
+           "start abbe calibrate otf, continue when it shows READY: drive the path now"),
        program.stop});
   add(program.dwell(stand_s));
 

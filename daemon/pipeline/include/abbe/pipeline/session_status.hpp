@@ -73,6 +73,20 @@ struct RequestedTouch {
   std::shared_ptr<const std::vector<FeatureToTouch>> features{};
 };
 
+/// Something that a run needs before the machine may drive off.
+struct StartCondition {
+  std::string name;  ///< "tracker", "axes", "position", "standstill"
+  bool met = false;
+  std::string text;  ///< what holds, or what is missing
+};
+
+/// Whether the machine may drive off; only while a run waits for it.
+struct StartState {
+  bool ready = false;   ///< all conditions hold: drive now
+  bool missed = false;  ///< the machine has driven off too early
+  std::vector<StartCondition> conditions;
+};
+
 struct SessionStatus {
   std::uint64_t id = 0;  ///< number of the session in this process, from 1; 0: none yet
   SessionState state = SessionState::Idle;
@@ -84,6 +98,7 @@ struct SessionStatus {
   std::size_t points = 0;
   /// in state Acquiring: estimated time to its end, in host time
   std::optional<std::chrono::nanoseconds> remaining{};
+  std::optional<StartState> start{};  ///< in state Warming, of a run along a path
   /// Tables of the run so far; null: there are none yet. Shared with replies that other threads
   /// write; never changed.
   std::shared_ptr<const LiveTables> live{};

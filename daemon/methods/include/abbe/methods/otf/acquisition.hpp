@@ -18,6 +18,7 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/calib/otf/run/path_index.hpp"
 #include "abbe/calib/otf/run/run.hpp"
+#include "abbe/methods/otf/start_check.hpp"
 #include "abbe/methods/temperature_range.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
 #include "abbe/pipeline/environment_use.hpp"
@@ -140,6 +141,10 @@ class OtfAcquisition {
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
   /// Reason of the failure, or the event that is awaited.
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
+  /// What the run needs before it begins; null once it has begun.
+  [[nodiscard]] const StartCheck* start() const noexcept {
+    return phase_ == Phase::WaitingAtStart ? &start_ : nullptr;
+  }
   [[nodiscard]] double progress() const noexcept;  ///< driven fraction of the path length, 0 to 1
   [[nodiscard]] std::size_t points() const noexcept { return points_.size(); }
   /// Time to the end of the path at the speed of the last half minute; nullopt if the machine does
@@ -170,6 +175,7 @@ class OtfAcquisition {
   [[nodiscard]] std::string no_start() const;
   void keep(const RunPoint& point);
   void wait_at_start(const RunPoint& point, const calib::Vector3& q);
+  void check_start(const RunPoint& point, bool settled, const std::optional<calib::Vector3>& q);
   void run(const RunPoint& point, const calib::Vector3& q);
   void track_standstill(const RunPoint& point, const calib::Vector3& q);
   void follow_path(const RunPoint& point, const calib::Vector3& q);
@@ -188,6 +194,7 @@ class OtfAcquisition {
   AcquisitionOptions options_;
   calib::otf::Mode mode_ = calib::otf::Mode::OnTheFly;
   Phase phase_ = Phase::WaitingAtStart;
+  StartCheck start_;
   std::string reason_;
   std::deque<RunPoint> before_;  // the last keep_before of the standstill at the first vertex
   std::chrono::nanoseconds longest_stand_{};  // at the first vertex, before the run

@@ -1,4 +1,4 @@
-#include "remaining_time.hpp"
+#include "session_words.hpp"
 
 #include <fmt/format.h>
 
@@ -13,6 +13,11 @@ std::string remaining_time(const nlohmann::json& session) {
   const double seconds = std::max(0.0, remaining->get<double>());
   return seconds < kMostSeconds ? fmt::format("about {:.0f} s left", seconds)
                                 : fmt::format("about {:.1f} min left", seconds / kSecondsInMinute);
+}
+
+std::string state_in_words(const nlohmann::json& session) {
+  const auto state = session.at("state").get<std::string>();
+  return state == "warming" ? "start" : state;
 }
 
 }  // namespace abbe::daemon

@@ -1,0 +1,91 @@
+#pragma once
+/// What a run on the fly needs before the machine may drive off: a list for the operator, and
+/// whether the machine has driven off without it. Depends on the points only, and on the time of
+/// tick() for streams that have stopped. Not for the RT path; not thread-safe. Lengths in m; axis
+/// positions are scale readings in the order X, Y, Z.
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/geometry/rigid_transform.hpp"
+#include "abbe/pipeline/session_status.hpp"
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::daemon {
+
+class StartCheck {
+ public:
+  struct Options {
+    calib::Vector3 first_m = calib::Vector3::Zero();   ///< first vertex of the path
+    calib::Vector3 second_m = calib::Vector3::Zero();  ///< the next vertex
+    double vertex_tolerance_m = 2e-3;
+    double path_tolerance_m = 10e-3;
+    std::chrono::nanoseconds stand_before{};  ///< shortest standstill before the run
+  };
+
+  struct Point {
+    protocol::HostTime time{};
+    bool usable = true;                 ///< valid, and slow enough
+    bool settled = true;                ///< the clock of the tracker is known
+    std::optional<calib::Vector3> q_m;  ///< nullopt: axis positions are missing
+    std::chrono::nanoseconds stood{};   ///< at the first vertex, with usable points
+  };
+
+  /// A stream of less than this share of usable points, or of points with axis positions, is not
+  /// sufficient for a run.
+  static constexpr double kShare = 0.95;
+
+  explicit StartCheck(const Options& options);
+
+  /// Each point while the run has not begun, in order of time.
+  void take(const Point& point);
+  /// `now`: host time.
+  void tick(protocol::HostTime now);
+
+  /// All conditions hold: the machine may drive off.
+  [[nodiscard]] bool ready() const noexcept { return ready_; }
+  /// The machine has left the first vertex along its first leg, and the run has not begun. True
+  /// until it stands at the first vertex again.
+  [[nodiscard]] bool missed() const noexcept { return !missed_.empty(); }
+  /// What the operator is told: what to wait for, that the machine may drive off, or what was
+  /// missing when it drove off.
+  [[nodiscard]] std::string text() const;
+  /// Conditions in the order in which the operator meets them: tracker, axes, position,
+  /// standstill; a tenth of a second old at most.
+  [[nodiscard]] StartState state() const { return {ready_, missed(), conditions_}; }
+
+ private:
+  // Counts of the points in half a second, by their times.
+  struct Counts {
+    protocol::HostTime begin{};
+    std::size_t points = 0, usable = 0, settled = 0, with_axes = 0;
+  };
+  static constexpr std::size_t kWindow = 4;
+
+  [[nodiscard]] Counts recent() const noexcept;
+  [[nodiscard]] bool at_start() const;
+  [[nodiscard]] std::vector<StartCondition> judged() const;
+  void judge(protocol::HostTime now);
+  [[nodiscard]] std::string missing() const;
+  [[nodiscard]] bool drives_first_leg(const calib::Vector3& q) const;
+
+  Options options_;
+  std::array<Counts, kWindow> window_{};  // ring, the latest at newest_
+  std::size_t newest_ = 0;
+  std::optional<protocol::HostTime> last_time_;
+  bool silent_ = true;  // no point for kSilence
+  std::optional<calib::Vector3> q_m_;
+  std::chrono::nanoseconds stood_{};
+  std::vector<StartCondition> conditions_;
+  protocol::HostTime judged_at_{};
+  bool was_at_start_ = false;
+  std::string missing_at_start_;  // when the machine was at the first vertex
+  bool ready_ = false;
+  std::string missed_;
+};
+
+}  // namespace abbe::daemon

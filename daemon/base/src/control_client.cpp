@@ -1,12 +1,17 @@
 #include <fmt/format.h>
+#include <grp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -30,6 +35,30 @@ constexpr std::size_t kLongestAnswer = 64u << 20;  // a verification with 10^5 s
 
 Error no_answer(const std::filesystem::path& path, std::string seen) {
   return {ErrorCode::Io, fmt::format("daemon at {}: {}", path.string(), seen)};
+}
+
+/// The name in /etc/group, else the number. Never asks a name service, which could hang.
+std::string group_name(gid_t gid) {
+  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen("/etc/group", "re"), &std::fclose);
+  std::array<char, 16384> buffer;
+  group entry{};
+  group* found = nullptr;
+  while (file && ::fgetgrent_r(file.get(), &entry, buffer.data(), buffer.size(), &found) == 0)
+    if (found->gr_gid == gid) return found->gr_name;
+  return fmt::format("{}", gid);
+}
+
+/// What to do if the socket cannot be connected.
+std::string advice(const std::filesystem::path& socket) {
+  struct stat seen {};
+  if (::access(socket.c_str(), R_OK | W_OK) == 0 || errno != EACCES ||
+      (::stat(socket.c_str(), &seen) != 0 && ::stat(socket.parent_path().c_str(), &seen) != 0))
+    return "is abbed running?";
+  return fmt::format(
+      "this user is not in the group {0}: run `sudo usermod -aG {0} $USER` and log in again, or "
+      "use "
+      "sudo",
+      group_name(seen.st_gid));
 }
 
 Result<void> send_line(int fd, const std::string& line, const std::filesystem::path& path) {
@@ -118,7 +147,8 @@ Result<json> ControlConnection::exchange(const json& request, std::chrono::milli
   if (!fd_) {
     auto fd = connect_unix(path_, time_out);
     if (!fd)
-      return tl::unexpected(Error{fd.error().code, fd.error().text + " (is abbed running?)"});
+      return tl::unexpected(
+          Error{fd.error().code, fmt::format("{} ({})", fd.error().text, advice(path_))});
     fd_ = std::move(*fd);
     set_send_time_out(fd_.get(), time_out);
   }

@@ -120,6 +120,36 @@ void add_commands(CLI::App& app, int& exit) {
   add_example(app, exit);
 }
 
+/// The command that the words name, as far as they name one: "abbe calibrate otf".
+std::pair<const CLI::App*, std::string> named_command(const CLI::App& app) {
+  const CLI::App* command = &app;
+  std::string name = "abbe";
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().back();
+    name += " " + command->get_name();
+  }
+  return {command, name};
+}
+
+/// A command line that cannot be used, with the help of the command that was typed.
+Error usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const auto [command, name] = named_command(app);
+  const std::string help = fmt::format("see `{} --help`", name);
+  const auto below = command->get_subcommands([](const CLI::App*) { return true; });
+  const bool command_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr &&
+                               !below.empty() && command->get_require_subcommand_min() > 0;
+  if (command == &app || !command_missing) return {ErrorCode::Usage, error.what(), {help}};
+
+  Error needs{ErrorCode::Usage, fmt::format("{} needs one of its commands", name), {}};
+  for (const CLI::App* each : below) {
+    const std::string all = each->get_description();
+    needs.details.push_back(
+        fmt::format("{} {}: {}", name, each->get_name(), all.substr(0, all.find('\n'))));
+  }
+  needs.details.push_back(help);
+  return needs;
+}
+
 int parse_and_run(const std::vector<std::string>& words) {
   int exit = 0;
   CLI::App app{
@@ -144,8 +174,7 @@ int parse_and_run(const std::vector<std::string>& words) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
     if (const auto unknown = unknown_command(app, words, programs)) return report(*unknown);
-    return report(
-        {ErrorCode::Usage, error.what(), {"see `abbe --help`, or --help after any command"}});
+    return report(usage_error(app, error));
   }
 
   return exit;

@@ -1,9 +1,11 @@
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <pwd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -49,6 +51,41 @@ TEST_F(Control, AnswersARequest) {
   const auto answer = ask_daemon(socket(), {{"do", "status"}, {"path", {1.5, 2.5}}});
   ASSERT_TRUE(answer) << answer.error().text;
   EXPECT_EQ((*answer)["heard"]["path"], json({1.5, 2.5}));
+}
+
+/// What a user without any rights is told who asks the daemon at `socket`, in a process of its own.
+std::string told_to_nobody(const std::filesystem::path& socket) {
+  std::array<int, 2> ends{};
+  EXPECT_EQ(::pipe(ends.data()), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    constexpr uid_t kNobody = 65534;
+    const bool left = ::geteuid() != 0 || (::setgroups(0, nullptr) == 0 && ::setgid(kNobody) == 0 &&
+                                           ::setuid(kNobody) == 0);
+    const auto answer = ask_daemon(socket, {{"do", "status"}});
+    const std::string told = !left ? "still root" : answer ? "an answer" : answer.error().text;
+    (void)!::write(ends[1], told.data(), told.size());
+    ::_exit(0);
+  }
+  ::close(ends[1]);
+  std::array<char, 4096> text{};
+  const ssize_t length = ::read(ends[0], text.data(), text.size());
+  ::close(ends[0]);
+  ::waitpid(child, nullptr, 0);
+  return {text.data(), length > 0 ? static_cast<std::size_t>(length) : 0};
+}
+
+TEST_F(Control, AUserWithoutRightsIsToldWhichGroupItNeeds) {
+  const auto server = ControlServer::open(socket(), echo);
+  ASSERT_TRUE(server);
+  namespace fs = std::filesystem;
+  fs::permissions(socket().parent_path(), fs::perms::none);
+  const std::string told = told_to_nobody(socket());
+  fs::permissions(socket().parent_path(), fs::perms::owner_all);
+  const struct group* own = ::getgrgid(::getegid());
+  ASSERT_NE(own, nullptr);
+  EXPECT_NE(told.find(std::string("usermod -aG ") + own->gr_name + " "), std::string::npos) << told;
+  EXPECT_EQ(told.find("is abbed running?"), std::string::npos) << told;
 }
 
 TEST_F(Control, ARequestLargerThanAnyBufferArrivesWhole) {

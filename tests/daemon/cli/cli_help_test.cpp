@@ -41,6 +41,22 @@ TEST_F(CliHelp, NamesTheNearestCommand) {
   EXPECT_THAT(abbe("frobnicate").err, HasSubstr("known: status, "));
 }
 
+TEST_F(CliHelp, AGroupOfCommandsAloneListsThem) {
+  const auto ran = abbe("calibrate");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("abbe calibrate needs one of its commands"),
+                             HasSubstr("abbe calibrate otf: "), HasSubstr("abbe calibrate evemu: "),
+                             HasSubstr("see `abbe calibrate --help`")));
+}
+
+TEST_F(CliHelp, AnErrorPointsToTheHelpOfItsCommand) {
+  const auto ran = abbe("identify otf --wrong");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("--wrong"), HasSubstr("see `abbe identify otf --help`")));
+  EXPECT_THAT(abbe("model eval").err, HasSubstr("see `abbe model eval --help`"));
+  EXPECT_THAT(abbe("").err, HasSubstr("see `abbe --help`"));
+}
+
 TEST_F(CliHelp, HelpIsACommand) {
   const auto help = abbe("help");
   EXPECT_EQ(help.exit, 0);

@@ -12,7 +12,8 @@ namespace {
 
 /// The page is as wide as the printed one, so that charts need no other size in print.
 constexpr std::string_view kStyle =
-    "@page{size:A4;margin:12mm 10mm}"
+    "@page{size:A4;margin:12mm 10mm 15mm;@bottom-right{content:'page 'counter(page)' of '"
+    "counter(pages);font:8.5pt sans-serif;width:30mm}}"
     "body{font:14px/1.4 system-ui,'DejaVu Sans',sans-serif;width:190mm;margin:1.5rem "
     "auto;color:#1b1f24}"
     "h1{font-size:1.45rem}h2{font-size:1.1rem;margin:1.6rem 0 .5rem;border-bottom:1px solid "
@@ -35,7 +36,32 @@ constexpr std::string_view kStyle =
     ".5rem}.columns p{break-after:avoid}"
     ".signal{display:flex;align-items:center;gap:4mm;font-size:1.1rem;font-weight:600}"
     ".signal svg{width:9mm;height:24mm;flex:none}ul{margin:.3rem 0;padding-left:1.2rem}"
-    "@media print{body{margin:0;print-color-adjust:exact;-webkit-print-color-adjust:exact}}";
+    ".front{font-size:12px;line-height:1.3}.front .columns{margin:.2rem 0}.front h2{margin:.6rem 0 "
+    ".2rem}.front p{margin:.2rem 0}.front table{margin:.2rem 0}.front .maps{margin:.3rem 0}.front "
+    ".signal{font-size:1rem}.front .signal svg{width:6mm;height:16mm}"
+    ".front .columns th{white-space:nowrap}"
+    ".maps.drawing{width:120mm}"
+    // So that the report of a model has at most 8 pages.
+    "@media print{h1{margin:.3rem 0}h2{margin:.7rem 0 .2rem;font-size:1rem}p{margin:.2rem 0}"
+    "table{margin:.25rem 0}.maps{width:140mm;margin:.3rem 0}.front .maps{width:190mm}"
+    ".plot{width:72mm}.plot.wide{width:146mm}.maps.drawing{width:80mm}"
+    ".columns{font-size:10.5px}body{font-size:11.5px;margin:0;print-color-adjust:exact;"
+    "-webkit-print-color-adjust:exact}}";
+
+constexpr std::string_view kFooter =
+    "@page{{@bottom-left{{content:'{}';font:8.5pt sans-serif;white-space:nowrap}}}}";
+
+/// The text of a CSS string: all but letters, digits and spaces by their number.
+/// Bytes beyond ASCII are left: they end no string.
+std::string in_style_sheet(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+    const bool is_plain = is_letter || (c >= '0' && c <= '9') || c == ' ' || c < 0;
+    out += is_plain ? std::string(1, c) : fmt::format("\\{:06x}", static_cast<unsigned>(c));
+  }
+  return out;
+}
 
 /// A cell of a table. A long word, as a hash, may be broken; a number never is.
 std::string cell(std::string_view text) {
@@ -133,6 +159,18 @@ void HtmlReport::end_columns() {
   body_ += "</div>\n";
 }
 
+void HtmlReport::begin_front() {
+  body_ += "<div class=\"front\">\n";
+}
+
+void HtmlReport::end_front() {
+  body_ += "</div>\n";
+}
+
+void HtmlReport::footer(std::string_view text) {
+  footer_ = in_style_sheet(text);
+}
+
 void HtmlReport::page_break() {
   body_ += "<div class=\"page\"></div>\n";
 }
@@ -148,9 +186,9 @@ void HtmlReport::drawing(const SpaceDrawing& drawing) {
 std::string HtmlReport::text() const {
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta "
-      "charset=\"utf-8\">\n<title>{0}</title>\n<style>{1}</style>\n"
-      "</head>\n<body>\n<h1>{0}</h1>\n{2}</body>\n</html>\n",
-      title_, kStyle, body_);
+      "charset=\"utf-8\">\n<title>{0}</title>\n<style>{1}{2}</style>\n"
+      "</head>\n<body>\n<h1>{0}</h1>\n{3}</body>\n</html>\n",
+      title_, kStyle, footer_.empty() ? std::string{} : fmt::format(kFooter, footer_), body_);
 }
 
 }  // namespace abbe::daemon

@@ -79,7 +79,11 @@ void add_parameters(HtmlReport& page, const calib::VolumetricModel& model) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& c : model.polynomials()->named_coefficients())
     rows.push_back({c.name, fmt::format("{:.6g}", c.value), fmt::format("{:.2g}", c.u), c.unit});
-  page.table({"", "value", "u", "unit"}, rows);
+  const auto half = rows.begin() + static_cast<std::ptrdiff_t>((rows.size() + 1) / 2);
+  page.begin_columns();
+  page.table({"", "value", "u", "unit"}, {rows.begin(), half});
+  if (half != rows.end()) page.table({"", "value", "u", "unit"}, {half, rows.end()});
+  page.end_columns();
 }
 
 void add_words(HtmlReport& page, const ModelDocument& document) {
@@ -100,17 +104,18 @@ Result<std::string> model_report(const ReportSubject& subject) {
   ABBE_TRY(values);
 
   HtmlReport page(fmt::format("{}: geometric calibration", document.machine));
+  add_footer(page, document);
   page.paragraph(fmt::format("Model {}, {}.", model_id(document), method_in_words(document)));
-  add_verdict_of(page, subject);
-  add_values(page, *values, 0, 1);
+  ABBE_TRY(add_front(page, subject, *values));
+
+  page.begin_columns();
+  add_values(page, *values, 0, values->groups.size());
+  page.end_columns();
   page.paragraph(box_in_words(values->standard));
+  add_not_estimable(page, *values);
   add_fit(page, document);
   if (document.run) add_held_out(page, *document.run);
 
-  page.page_break();
-  page.begin_columns();
-  add_values(page, *values, 1, values->groups.size());
-  page.end_columns();
   page.page_break();
   add_value_curves(page, *values);
   add_field(page, document.model, values->standard.box);
@@ -122,7 +127,6 @@ Result<std::string> model_report(const ReportSubject& subject) {
   add_places(page, document, values->standard.box);
   add_residuals_of(page, document);
   add_tables_of_method(page, document);
-  page.page_break();
   add_words(page, document);
   add_origin_of(page, subject);
   return page.text();

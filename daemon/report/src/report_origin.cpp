@@ -113,12 +113,6 @@ void add_origin_of(HtmlReport& page, const ReportSubject& subject) {
   std::vector<std::vector<std::string>> rows;
   for (const InputFile& input : subject.document.inputs) rows.push_back({input.name, input.sha256});
   if (!rows.empty()) page.table({"input", "SHA-256"}, rows);
-
-  page.heading("Signature");
-  const CertificateDetails& d = subject.details;
-  page.facts({{"name", d.person.empty() ? std::string(40, '_') : joined({d.person, d.role})},
-              {"date", d.issue_date.empty() ? std::string(40, '_') : d.issue_date},
-              {"signature", std::string(40, '_')}});
 }
 
 }  // namespace abbe::daemon

@@ -128,7 +128,7 @@ std::vector<std::string> row_of(const RunFigures::Part& part) {
 
 /// Of many parts those with the largest residuals.
 void add_table_of_parts(HtmlReport& page, const RunFigures& run) {
-  constexpr std::size_t kShown = 40;
+  constexpr std::size_t kShown = 24;
   std::vector<const RunFigures::Part*> parts;
   for (const RunFigures::Part& part : run.parts) parts.push_back(&part);
   if (parts.size() > kShown) {
@@ -142,8 +142,13 @@ void add_table_of_parts(HtmlReport& page, const RunFigures& run) {
   }
   std::vector<std::vector<std::string>> rows;
   for (const RunFigures::Part* part : parts) rows.push_back(row_of(*part));
-  page.table({run.part_kind, "count", "before, rms um", "after, rms um", "largest, um", "time, s"},
-             rows);
+  const std::vector<std::string> columns{run.part_kind,   "count",       "before, rms um",
+                                         "after, rms um", "largest, um", "time, s"};
+  const auto half = rows.begin() + static_cast<std::ptrdiff_t>((rows.size() + 1) / 2);
+  page.begin_columns();
+  page.table(columns, {rows.begin(), half});
+  if (half != rows.end()) page.table(columns, {half, rows.end()});
+  page.end_columns();
 }
 
 void add_bar(HtmlReport& page, const BarFigures& bar) {

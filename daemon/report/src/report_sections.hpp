@@ -42,10 +42,18 @@ inline constexpr std::string_view kResidualsOfParts =
 /// "V from X -300 to 300 mm, ..."
 [[nodiscard]] std::string box_in_words(const calib::iso::StandardValues& standard);
 
+/// The first page: identity, verdict, limits, result, a picture, signature. After it, what does not
+/// fit on it. BadInput: a limit of the details cannot be judged.
+[[nodiscard]] Result<void> add_front(HtmlReport& page, const ReportSubject& subject,
+                                     const CertifiedValues& values);
 void add_verdict_of(HtmlReport& page, const ReportSubject& subject);
+/// The same with as many reasons and notes as fit on the first page. True: these are all.
+bool add_short_verdict_of(HtmlReport& page, const ReportSubject& subject);
 /// Tables of the groups with index first, first + 1 ... last - 1.
 void add_values(HtmlReport& page, const CertifiedValues& values, std::size_t first,
                 std::size_t last);
+/// In one paragraph the values that are not estimable, by their reason.
+void add_not_estimable(HtmlReport& page, const CertifiedValues& values);
 /// Positioning, straightness and diagonals as curves.
 void add_value_curves(HtmlReport& page, const CertifiedValues& values);
 /// V as vectors in the volume.

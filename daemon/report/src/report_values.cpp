@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "abbe/base/units.hpp"
 #include "report_sections.hpp"
@@ -51,11 +52,24 @@ void add_values(HtmlReport& page, const CertifiedValues& values, std::size_t fir
     page.paragraph(group.explanation);
     std::vector<std::vector<std::string>> rows;
     for (const CertifiedValue& v : group.values)
-      rows.push_back({v.name, v.value.empty() ? "not estimable" : v.value,
-                      v.value.empty() ? "" : (v.U.empty() ? "-" : v.U),
-                      v.is_angle ? "urad" : "um"});
-    page.table({"", "value", "U (k = 2)", "unit"}, rows);
+      if (!v.value.empty())
+        rows.push_back({v.name, v.value, v.U.empty() ? "-" : v.U, v.is_angle ? "urad" : "um"});
+    if (!rows.empty()) page.table({"", "value", "U (k = 2)", "unit"}, rows);
   }
+}
+
+void add_not_estimable(HtmlReport& page, const CertifiedValues& values) {
+  std::map<std::string, std::string> keys_of_reason;
+  for (const ValueGroup& group : values.groups)
+    for (const CertifiedValue& v : group.values) {
+      if (!v.value.empty()) continue;
+      std::string& keys = keys_of_reason[v.why];
+      keys += (keys.empty() ? "" : ", ") + v.key;
+    }
+  std::string text;
+  for (const auto& [why, keys] : keys_of_reason)
+    text += fmt::format("{}{} ({})", text.empty() ? "" : "; ", keys, why);
+  if (!text.empty()) page.paragraph(fmt::format("Not estimable: {}.", text));
 }
 
 Curve positioning_curve(const calib::iso::Positioning& positioning, std::string name) {

@@ -61,8 +61,8 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
   }
   const auto certified = obstacles_to_use(in_use(subject, ModelPurpose::Certificate));
   if (subject.forced && !certified.refusals.empty())
-    notes.push_back("a certificate of it was made nevertheless, forced by " +
-                    who_and_when(*subject.forced));
+    notes.insert(notes.begin(), "a certificate of it was made nevertheless, forced by " +
+                                    who_and_when(*subject.forced));
   for (auto& wrong : contradictory_times(subject)) notes.push_back(std::move(wrong));
   add_obstacles(subject, notes);
   add_expired_equipment(subject, notes);
@@ -71,6 +71,30 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
 
 bool has_drifted(const ReportSubject& subject) {
   return !subject.events.empty() && subject.events.back().action == StoreAction::Drifted;
+}
+
+/// Those that together have at most so many characters. Each takes at least the width of the page.
+std::vector<std::string> first_of(const std::vector<std::string>& items, std::size_t most) {
+  constexpr std::size_t kLine = 100;
+  std::vector<std::string> first;
+  std::size_t used = 0;
+  for (const std::string& item : items) {
+    used += std::max(item.size(), kLine);
+    if (used > most) break;
+    first.push_back(item);
+  }
+  return first;
+}
+
+void add_items(HtmlReport& page, const VerdictInWords& verdict) {
+  if (!verdict.reasons.empty()) {
+    page.paragraph("Reasons:");
+    page.list(verdict.reasons);
+  }
+  if (!verdict.notes.empty()) {
+    page.paragraph("Notes, no reasons against the model:");
+    page.list(verdict.notes);
+  }
 }
 
 std::string_view place_in_words(const ReportSubject& subject) {
@@ -106,16 +130,25 @@ VerdictInWords verdict_in_words(const ReportSubject& subject) {
 
 void add_verdict_of(HtmlReport& page, const ReportSubject& subject) {
   const VerdictInWords verdict = verdict_in_words(subject);
-  page.heading("Verdict");
+  page.heading("Verdict in full");
   page.signal(verdict.signal, verdict.text);
-  if (!verdict.reasons.empty()) {
-    page.paragraph("Reasons:");
-    page.list(verdict.reasons);
-  }
-  if (!verdict.notes.empty()) {
-    page.paragraph("Notes, no reasons against the model:");
-    page.list(verdict.notes);
-  }
+  add_items(page, verdict);
+}
+
+bool add_short_verdict_of(HtmlReport& page, const ReportSubject& subject) {
+  constexpr std::size_t kMostOfReasons = 500, kMostOfNotes = 700;
+  const VerdictInWords all = verdict_in_words(subject);
+  VerdictInWords shown = all;
+  shown.reasons = first_of(all.reasons, kMostOfReasons);
+  shown.notes = first_of(all.notes, kMostOfNotes);
+  const std::size_t more =
+      all.reasons.size() - shown.reasons.size() + all.notes.size() - shown.notes.size();
+  page.heading("Verdict");
+  page.signal(shown.signal, shown.text);
+  add_items(page, shown);
+  if (more > 0)
+    page.paragraph(fmt::format("{} more reasons and notes are on the next page.", more));
+  return more == 0;
 }
 
 }  // namespace abbe::daemon

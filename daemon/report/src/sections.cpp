@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "abbe/base/local_time.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/base/utc_text.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -23,6 +23,26 @@ std::string um_text(double length_m, int decimals) {
   return fmt::format("{:.{}f} um", length_m * kUmPerM, decimals);
 }
 
+std::string shortened(std::string text) {
+  constexpr std::size_t kMost = 90;
+  if (text.size() <= kMost) return text;
+  std::size_t end = kMost;
+  // Not in the middle of a character of UTF-8.
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  return text.substr(0, end) + " ...";
+}
+
+void add_footer(HtmlReport& page, const ModelDocument& document) {
+  page.footer(fmt::format("model {} hash {}", model_id(document), model_hash(document)));
+}
+
+void add_signature(HtmlReport& page, const std::string& name, const std::string& date) {
+  const std::string line(28, '_');
+  page.heading("Signature");
+  page.table({"name", "date", "signature"},
+             {{name.empty() ? line : shortened(name), date.empty() ? line : date, line}});
+}
+
 void add_model_origin(HtmlReport& page, const ModelDocument& document,
                       const std::vector<InputFile>& inputs,
                       const std::vector<std::pair<std::string, std::string>>& more) {
@@ -35,7 +55,7 @@ void add_model_origin(HtmlReport& page, const ModelDocument& document,
        fmt::format("{}{}, {}", document.method,
                    document.mode.empty() ? "" : " (" + document.mode + ")", document.estimator)},
       {"datum", std::string{calib::name(document.model.datum())}},
-      {"created (UTC)", to_text(document.created)}};
+      {"created", local_time_text(document.created)}};
   facts.insert(facts.end(), more.begin(), more.end());
   page.facts(facts);
   add_inputs(page, inputs);

@@ -146,7 +146,7 @@ double aspect(const ValueMap& map) {
 std::string svg(const ValueMaps& maps) {
   if (maps.maps.empty()) return {};
   const double largest = std::max(largest_value(maps), 1e-12);
-  const auto count = static_cast<double>(maps.maps.size());
+  const auto count = static_cast<double>(std::max(maps.maps.size(), maps.least_places));
   const double width = (kPage - kLeft - kRight - (count - 1.0) * kGap) / count;
   const double height = width * aspect(maps.maps.front());
   std::string out = fmt::format(

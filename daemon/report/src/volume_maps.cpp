@@ -225,6 +225,29 @@ std::vector<RunFigures::HeldOutCell> held_out_cells(const calib::ValidityVolume&
   return cells;
 }
 
+void add_before_and_after(HtmlReport& page, const calib::VolumetricModel& model, Cells held_out) {
+  if (model.validity().vertices_m().empty()) return;
+  constexpr std::size_t kMiddle = 1;
+  ModelMaps maps = maps_of(model);
+  const std::string cut = maps.V.maps[kMiddle].title;
+  ValueMaps picture = std::move(maps.V);
+  picture.title = fmt::format("Error before and after compensation, {}", cut);
+  // A high volume is drawn narrower, so that the picture leaves space for the rest of the page.
+  const auto extent = [](const std::vector<double>& edges) { return edges.back() - edges.front(); };
+  const ValueMap& first = picture.maps[kMiddle];
+  picture.least_places = extent(first.y_edges) > extent(first.x_edges) ? 4 : 3;
+  ValueMap before = std::move(picture.maps[kMiddle]), after = std::move(maps.U.maps[kMiddle]);
+  before.title = "before: |V|";
+  after.title = "after: |V| is below U(V)";
+  picture.maps = {std::move(before), std::move(after)};
+  if (observations_of(held_out) > 0) {
+    ValueMap left = std::move(map_of(held_out, model.validity()).maps[kMiddle]);
+    left.title = "after: residual, rms";
+    picture.maps.push_back(std::move(left));
+  }
+  page.maps(picture);
+}
+
 void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
                      std::span<const RunFigures::HeldOutCell> held_out) {
   if (model.validity().vertices_m().empty()) return;

@@ -75,6 +75,21 @@ void read_equipment(Section& root, CertificateDetails& out) {
   }
 }
 
+void read_tolerances(Section& root, CertificateDetails& out) {
+  for (Section& section : root.children("tolerance")) {
+    ToleranceDetails& t = out.tolerances.emplace_back();
+    section.get("value", t.value, Need::Required);
+    double limit_um = 0.0, limit_urad = 0.0;
+    section.get("limit_um", limit_um, kPlain, kPositive);
+    section.get("limit_urad", limit_urad, kPlain, kPositive);
+    t.is_angle = section.has("limit_urad");
+    if (section.has("limit_um") == t.is_angle)
+      section.fault("value", "needs one limit: limit_um of a length, limit_urad of an angle");
+    t.limit_um_urad = t.is_angle ? limit_urad : limit_um;
+    section.close();
+  }
+}
+
 }  // namespace
 
 Result<CertificateDetails> read_certificate_toml(const std::filesystem::path& file) {
@@ -101,6 +116,7 @@ Result<CertificateDetails> read_certificate_toml(const std::filesystem::path& fi
   machine.close();
   read_conditions(root.child("conditions"), details);
   read_equipment(root, details);
+  read_tolerances(root, details);
   root.close();
 
   if (faults.any()) return tl::make_unexpected(faults.to_error());

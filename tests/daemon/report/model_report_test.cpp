@@ -87,13 +87,95 @@ TEST(ModelReport, HasTheVerdictFirstAndEverythingThatIsSigned) {
   EXPECT_LT(page.find("Green: the gate accepted"), page.find("Volumetric error"));
   for (const ValueGroup& group : values.groups)
     for (const CertifiedValue& v : group.values)
-      EXPECT_THAT(page, HasSubstr("<td>" + (v.value.empty() ? "not estimable" : v.value) + "</td>"))
-          << v.key;
+      EXPECT_THAT(page, HasSubstr(v.value.empty() ? v.key : "<td>" + v.value + "</td>")) << v.key;
   EXPECT_THAT(page,
               AllOf(HasSubstr("reference axis X"), HasSubstr("What the uncertainty does not"),
                     HasSubstr("ECY, EAZ, EBZ, ECZ: with one tool offset"), HasSubstr("turner"),
                     HasSubstr("20.0, -15.0, -120.0 mm"), HasSubstr("11ee"), HasSubstr("Signature"),
                     HasSubstr(model_hash(subject.document))));
+}
+
+TEST(ModelReport, HasOneParagraphForAllThatIsNotEstimable) {
+  const std::string page = model_report(reported(3)).value();
+  EXPECT_EQ(times(page, "<td>not estimable</td>"), 0u);
+  EXPECT_EQ(times(page, "<p>Not estimable: "), 1u);
+  const auto from = page.find("<p>Not estimable: ");
+  const std::string paragraph = page.substr(from, page.find("</p>", from) - from);
+  for (const char* const key : {"X.E", "X.B", "Z.B", "PPP.E", "NNP.B", "E_d"})
+    EXPECT_THAT(paragraph, HasSubstr(key));
+  EXPECT_EQ(times(paragraph, "no differences between the directions of travel"), 1u);
+}
+
+/// The text of the first page.
+std::string front_of(const ReportSubject& subject) {
+  const std::string page = model_report(subject).value();
+  return page.substr(0, page.find("class=\"page\""));
+}
+
+TEST(ModelReport, TheFirstPageNamesTheKeyOfWhatIsNotKnown) {
+  EXPECT_THAT(front_of(reported(3)),
+              AllOf(HasSubstr("<td>not stated (machine.serial)</td>"),
+                    HasSubstr("<td>not stated (certificate.number)</td>"),
+                    HasSubstr("<td>not stated (customer.name)</td>"),
+                    HasSubstr("<td>not known (conditions.temperature_C)</td>"),
+                    HasSubstr("equipment.serial"), HasSubstr("[[tolerance]]"),
+                    HasSubstr("neither pass nor fail"), HasSubstr("Signature"),
+                    HasSubstr("<td>turner</td>")));
+}
+
+TEST(ModelReport, TheFirstPageHasWhatIsKnownTheWorstAxisAndThePicture) {
+  ReportSubject subject = reported(3);
+  CertificateDetails& d = subject.details;
+  d.machine_serial = "600-0815";
+  d.number = "2026-0117";
+  d.customer.name = "Example Machining";
+  d.person = "E. Abbe";
+  d.temperature_C = 20.4;
+  d.equipment = {{.name = "tracker", .serial = "4711"}};
+  const std::string front = front_of(subject);
+  EXPECT_THAT(front, AllOf(HasSubstr("600-0815"), HasSubstr("2026-0117"), HasSubstr("E. Abbe"),
+                           HasSubstr("Example Machining"), HasSubstr("20.40 C"),
+                           HasSubstr("tracker 4711"), HasSubstr("before: |V|")));
+  const auto standard = calib::iso::standard_values(subject.document.model).value();
+  double largest_m = 0.0;
+  char worst = '?';
+  const auto take = [&](double range_m, calib::Axis axis) {
+    if (range_m <= largest_m) return;
+    largest_m = range_m;
+    worst = letter(axis);
+  };
+  for (const auto& p : standard.positioning) take(p.M.value, p.axis);
+  for (const auto& s : standard.straightness)
+    if (s.range.in_model) take(s.range.value, s.motion.axis);
+  EXPECT_THAT(front, HasSubstr(std::string("worst axis: ") + worst));
+}
+
+TEST(ModelReport, TheFirstPageHasTheVerdictOnTheLimits) {
+  ReportSubject subject = reported(3);
+  subject.details.tolerances = {{.value = "X.M", .limit_um_urad = 1e6}};
+  EXPECT_THAT(front_of(subject), AllOf(HasSubstr("Pass: every value"), HasSubstr("1e+06 um"),
+                                       HasSubstr("<td>pass</td>")));
+  subject.details.tolerances.push_back({.value = "Y.M", .limit_um_urad = 1e-3});
+  EXPECT_THAT(front_of(subject), HasSubstr("Fail: a value is beyond its limit."));
+  subject.details.tolerances = {{.value = "X.nothing", .limit_um_urad = 1.0}};
+  EXPECT_EQ(model_report(subject).error().code, ErrorCode::BadInput);
+}
+
+TEST(ModelReport, EachSheetHasTheHashOfTheModelAndItsNumber) {
+  const ReportSubject subject = reported(3);
+  const std::string page = model_report(subject).value();
+  const std::string style = page.substr(0, page.find("</style>"));
+  EXPECT_THAT(style, AllOf(HasSubstr(model_hash(subject.document)), HasSubstr("counter(pages)")));
+}
+
+TEST(ModelReport, LongReasonsGoOnOnTheSecondPage) {
+  ReportSubject subject = reported(3, false);
+  auto& reasons = subject.document.verdict->reasons;
+  for (int i = 0; i < 30; ++i) reasons.push_back(std::string(80, 'r') + std::to_string(i));
+  const std::string front = front_of(subject);
+  EXPECT_THAT(front, AllOf(HasSubstr("more reasons and notes are on the next page"),
+                           HasSubstr("Signature"), Not(HasSubstr("r29"))));
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("r29"));
 }
 
 TEST(ModelReport, StatesReasonsAndNotesApart) {

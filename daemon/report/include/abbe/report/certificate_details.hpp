@@ -27,6 +27,13 @@ struct EquipmentDetails {
 /// True if the instrument was used as found, or as left.
 [[nodiscard]] bool is_used(const EquipmentDetails& equipment, EquipmentUse use);
 
+/// The largest size that a value of the report may have.
+struct ToleranceDetails {
+  std::string value;         ///< CertifiedValue::key: "X.M", "EC0Y", "U.max"
+  double limit_um_urad = 0;  ///< um, of an angle urad; positive
+  bool is_angle = false;     ///< the limit was given in urad
+};
+
 struct CertificateDetails {
   /// Dates as in ISO 8601, "2026-11-26". location: one of laboratory, customer, laboratoryBranch,
   /// customerBranch, other.
@@ -39,6 +46,7 @@ struct CertificateDetails {
   /// are absent, those that the run recorded are stated.
   std::optional<double> temperature_C, u_temperature_K, humidity_percent, feed_mm_per_min;
   std::vector<EquipmentDetails> equipment;
+  std::vector<ToleranceDetails> tolerances{};  ///< empty: no statement of conformity
   /// When the certificate is made: later dates of issue and identification are refused. nullopt:
   /// not known.
   std::optional<protocol::UtcTime> now{};

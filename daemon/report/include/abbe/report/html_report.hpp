@@ -85,6 +85,11 @@ class HtmlReport {
   /// What is added in between is set in two columns and small print, so that it fits on one page.
   void begin_columns();
   void end_columns();
+  /// What is added in between is set in small print, so that it fits on the first page.
+  void begin_front();
+  void end_front();
+  /// At the foot of each printed page, beside "page n of N".
+  void footer(std::string_view text);
   void maps(const ValueMaps&);
   void drawing(const SpaceDrawing&);
 
@@ -92,7 +97,7 @@ class HtmlReport {
   [[nodiscard]] std::string text() const;
 
  private:
-  std::string title_, body_;
+  std::string title_, body_, footer_;
 };
 
 }  // namespace abbe::daemon

@@ -46,6 +46,12 @@ struct VolumeCuts {
 [[nodiscard]] std::vector<RunFigures::HeldOutCell> held_out_cells(
     const calib::ValidityVolume& volume, std::span<const LeftError> left);
 
+/// Adds one picture before and after: |V| without compensation in the middle of the volume, U(V),
+/// which bounds what is left, and, if `held_out` is not empty, the rms of the observations there to
+/// which the model was not fitted; all with one colour scale.
+void add_before_and_after(HtmlReport& page, const calib::VolumetricModel& model,
+                          std::span<const RunFigures::HeldOutCell> held_out = {});
+
 /// Adds maps of the volume: |V| of the machine without compensation, the expanded uncertainty
 /// U(V) = 2 sqrt(trace cov V), and, if `held_out` is not empty, the rms of the observations to
 /// which the model was not fitted.

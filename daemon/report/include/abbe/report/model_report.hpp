@@ -1,7 +1,7 @@
 #pragma once
 /// Reports made from stored models, the same for every method: one model, two models side by side,
-/// all models of a machine. HTML without JavaScript that prints on A4. Pure: the same input gives
-/// the same bytes; no date is contained that is not in the input.
+/// all models of a machine. HTML without JavaScript that prints on A4. The same input gives
+/// the same bytes in the same time zone; no date is contained that is not in the input.
 
 #include <optional>
 #include <string>

@@ -14,6 +14,13 @@ namespace abbe::daemon {
 /// "12.35 um".
 [[nodiscard]] std::string um_text(double length_m, int decimals = 2);
 
+/// At the foot of each printed sheet: id and hash of the model, beside the number of the page.
+void add_footer(HtmlReport& page, const ModelDocument& document);
+/// A line for name, date and signature; empty: to be filled in by hand.
+void add_signature(HtmlReport& page, const std::string& name = {}, const std::string& date = {});
+/// Text for a row of the first page: shortened to the width of the page, with "...".
+[[nodiscard]] std::string shortened(std::string text);
+
 /// Adds the origin of a model, the additional rows `more`, and the input files of this report.
 void add_model_origin(HtmlReport& page, const ModelDocument& document,
                       const std::vector<InputFile>& inputs,

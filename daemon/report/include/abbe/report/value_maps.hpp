@@ -3,6 +3,7 @@
 /// dark (largest value), so that the order is also visible to people with colour vision deficiency
 /// and in a print without colours. Drawn as SVG. Pure.
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,7 @@ struct ValueMaps {
   std::string title, x_label, y_label;
   std::string scale_label;  ///< quantity and unit of the values
   std::vector<ValueMap> maps;
+  std::size_t least_places = 1;  ///< a map is not wider than if so many were beside each other
 };
 
 /// An SVG element. Each cell with a value carries the value in the attribute data-v.

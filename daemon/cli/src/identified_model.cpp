@@ -12,13 +12,20 @@
 
 namespace abbe::daemon {
 
-void add_result_options(CLI::App& command, std::string& keep, bool& json, std::string& out) {
+void add_pdf_option(CLI::App& command, std::string& pdf) {
+  command.add_option("--pdf", pdf,
+                     "also write the report as this PDF file; needs weasyprint or chromium");
+}
+
+void add_result_options(CLI::App& command, const ResultOptions& options) {
   command.add_option(
-      "--keep", keep,
+      "--keep", options.keep,
       "also add the model to this store, and compare it with its active model; to activate it,\n"
       "use abbe model activate");
-  command.add_flag("--json", json, "print the summary as one JSON object");
-  command.add_option("-o,--out", out, "folder for the results; created if needed")->required();
+  command.add_flag("--json", options.json, "print the summary as one JSON object");
+  command.add_option("-o,--out", options.out, "folder for the results; created if needed")
+      ->required();
+  add_pdf_option(command, options.pdf);
 }
 
 void print_verdict(const calib::Verdict& verdict) {

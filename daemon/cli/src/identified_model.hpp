@@ -11,8 +11,17 @@
 
 namespace abbe::daemon {
 
-/// Adds --keep, --json and --out.
-void add_result_options(CLI::App& command, std::string& keep, bool& json, std::string& out);
+/// Where the options of the result go.
+struct ResultOptions {
+  std::string& keep;
+  bool& json;
+  std::string &out, &pdf;
+};
+/// Adds --keep, --json, --out and --pdf. What `options` refers to must outlive `command`.
+void add_result_options(CLI::App& command, const ResultOptions& options);
+
+/// Adds --pdf FILE.
+void add_pdf_option(CLI::App& command, std::string& pdf);
 
 /// Prints the held-out residuals and the decision of the gate to stdout.
 void print_verdict(const calib::Verdict& verdict);

@@ -34,7 +34,7 @@ namespace {
 namespace evemu = calib::evemu;
 
 struct IdentifyEvemuCommand : IdentifyEvemuArguments {
-  std::string out;
+  std::string out, pdf;
   bool json = false;
 };
 
@@ -155,10 +155,14 @@ int run(const IdentifyEvemuCommand& arguments) {
   bar.clear();
   if (!outcome) return report(outcome.error());
   const calib::Verdict& verdict = outcome->candidate.verdict;
-  if (const auto done = write_and_keep({arguments.out, arguments.keep, "abbe identify evemu"},
-                                       outcome->document, verdict, files_of(*outcome));
-      !done)
+  if (const auto done =
+          write_and_keep({arguments.out, arguments.keep, "abbe identify evemu", arguments.pdf},
+                         outcome->document, verdict, files_of(*outcome), bar.progress());
+      !done) {
+    bar.clear();
     return report(done.error());
+  }
+  bar.clear();
   arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
 
   return exit_code(verdict);
@@ -228,7 +232,7 @@ void add_options(CLI::App& command, IdentifyEvemuCommand& arguments) {
       "--accept-shape-only", arguments.accept_shape_only,
       "do not refuse the model because its rotation about Ball1 is unknown; as [gate] accept =\n"
       "[\"evemu-shape-only\"]");
-  add_result_options(command, arguments.keep, arguments.json, arguments.out);
+  add_result_options(command, {arguments.keep, arguments.json, arguments.out, arguments.pdf});
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ namespace abbe::daemon {
 namespace {
 
 struct IdentifyJointCommand : IdentifyJointArguments {
-  std::string out;
+  std::string out, pdf;
   bool json = false;
 };
 
@@ -53,13 +53,17 @@ void print_joint_summary(const JointOutcome& outcome, const std::filesystem::pat
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
 
-int write_and_print(const IdentifyJointCommand& arguments, const JointOutcome& outcome) {
+int write_and_print(const IdentifyJointCommand& arguments, const JointOutcome& outcome,
+                    ProgressBar& bar) {
   const ModelDocument& document = outcome.document;
-  if (const auto done =
-          write_and_keep({arguments.out, arguments.keep, "abbe identify joint"}, document,
-                         outcome.verdict, {{"tables.csv", to_tables_csv(document.model)}});
-      !done)
+  if (const auto done = write_and_keep(
+          {arguments.out, arguments.keep, "abbe identify joint", arguments.pdf}, document,
+          outcome.verdict, {{"tables.csv", to_tables_csv(document.model)}}, bar.progress());
+      !done) {
+    bar.clear();
     return report(done.error());
+  }
+  bar.clear();
 
   if (arguments.json)
     fmt::print("{}\n", indented_json_text(joint_json(outcome, arguments.out)));
@@ -85,7 +89,7 @@ int run_joint(const IdentifyJointCommand& arguments) {
   if (!found) return report(found.error());
   if (auto* contradiction = std::get_if<JointContradiction>(&*found))
     return report_contradiction(*contradiction, arguments.json);
-  return write_and_print(arguments, std::get<JointOutcome>(*found));
+  return write_and_print(arguments, std::get<JointOutcome>(*found), bar);
 }
 
 void add_joint_options(CLI::App& command, IdentifyJointCommand& arguments) {
@@ -117,7 +121,7 @@ void add_joint_options(CLI::App& command, IdentifyJointCommand& arguments) {
   command.add_flag("--accept-path-orientation", arguments.accept_path_orientation,
                    "do not refuse the model because a path might be rotated by 180 degrees");
   add_scales_corrected(command, arguments.scales_corrected);
-  add_result_options(command, arguments.keep, arguments.json, arguments.out);
+  add_result_options(command, {arguments.keep, arguments.json, arguments.out, arguments.pdf});
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ namespace abbe::daemon {
 namespace {
 
 struct IdentifyMfbCommand : IdentifyMfbArguments {
-  std::string out;
+  std::string out, pdf;
   bool json = false;
 };
 
@@ -34,11 +34,14 @@ int run(const IdentifyMfbCommand& arguments) {
   bar.clear();
   if (!outcome) return report(outcome.error());
   const auto& [candidate, document] = *outcome;
-  if (const auto done =
-          write_and_keep({arguments.out, arguments.keep, "abbe identify mfb"}, document,
-                         candidate.verdict, {{"tables.csv", to_tables_csv(document.model)}});
-      !done)
+  if (const auto done = write_and_keep(
+          {arguments.out, arguments.keep, "abbe identify mfb", arguments.pdf}, document,
+          candidate.verdict, {{"tables.csv", to_tables_csv(document.model)}}, bar.progress());
+      !done) {
+    bar.clear();
     return report(done.error());
+  }
+  bar.clear();
 
   if (arguments.json)
     fmt::print("{}\n", indented_json_text(mfb_json(document, candidate, arguments.out)));
@@ -88,7 +91,7 @@ void add_options(CLI::App& command, IdentifyMfbCommand& arguments) {
       ->needs(trials)
       ->capture_default_str();
   recording->excludes(add_scales_corrected(command, arguments.scales_corrected));
-  add_result_options(command, arguments.keep, arguments.json, arguments.out);
+  add_result_options(command, {arguments.keep, arguments.json, arguments.out, arguments.pdf});
 }
 
 }  // namespace

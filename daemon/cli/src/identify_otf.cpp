@@ -27,7 +27,7 @@ namespace otf = calib::otf;
 namespace {
 
 struct IdentifyOtfCommand : IdentifyOtfArguments {
-  std::string out;
+  std::string out, pdf;
   bool json = false;
 };
 
@@ -125,10 +125,14 @@ int run(const IdentifyOtfCommand& arguments) {
   if (!outcome) return report(outcome.error());
   const ModelDocument& document = outcome->document;
   if (const auto done = write_and_keep(
-          {arguments.out, arguments.keep, "abbe identify otf"}, document, outcome->verdict,
-          {{"tables.csv", to_tables_csv(document.model, document.backlash)}});
-      !done)
+          {arguments.out, arguments.keep, "abbe identify otf", arguments.pdf}, document,
+          outcome->verdict, {{"tables.csv", to_tables_csv(document.model, document.backlash)}},
+          bar.progress());
+      !done) {
+    bar.clear();
     return report(done.error());
+  }
+  bar.clear();
   arguments.json ? print_json(*outcome, arguments) : print_summary(*outcome, arguments);
   return exit_code(outcome->verdict);
 }
@@ -241,7 +245,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
           "--segment-samples", arguments->segment_samples,
           "samples averaged in a segment (on-the-fly); default: segments of 8.3 mm of travel")
       ->check(CLI::Range(1, 1000));
-  add_result_options(*command, arguments->keep, arguments->json, arguments->out);
+  add_result_options(*command, {arguments->keep, arguments->json, arguments->out, arguments->pdf});
 
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }

@@ -16,13 +16,20 @@ namespace abbe::daemon {
 namespace {
 
 int run_report(const ReportArguments& arguments) {
+  ProgressBar bar;
+  bar.show("making the report", 0.0);
   const auto made = make_report(arguments, [](const StoreEntry& entry) {
     fmt::print(stderr, "abbe: model {} is left out: {}\n", entry.id, printable_line(entry.fault));
   });
+  bar.clear();
   if (!made) return report(made.error());
   if (made->verdict.signal != Signal::Green) fmt::print("verdict     {}\n", made->verdict.text);
-  const auto done =
-      write_report(*made, [](const std::string& file) { fmt::print("written     {}\n", file); });
+  const auto show_written = [&bar](const std::string& file) {
+    bar.clear();
+    fmt::print("written     {}\n", file);
+  };
+  const auto done = write_report(*made, show_written, bar.progress());
+  bar.clear();
   return done ? 0 : report(done.error());
 }
 
@@ -35,7 +42,7 @@ void add_report(CLI::App& parent, int& exit) {
       "Write the report of a model as HTML that prints on A4: verdict, volumetric error, values "
       "of\n"
       "ISO 230-1, 230-2 and 230-6 with uncertainty, what is not known, origin. The same model,\n"
-      "state of the store and details give the same bytes at any time.");
+      "state of the store, details and time zone give the same bytes at any time.");
   command
       ->add_option("MODEL", arguments->model,
                    "model id, the beginning of an id (at least 4 characters), \"active\", or the "

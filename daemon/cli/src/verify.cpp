@@ -15,10 +15,13 @@
 #include "abbe/base/units.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/effect_name.hpp"
+#include "abbe/tasks/output_files.hpp"
+#include "abbe/tasks/pdf_converter.hpp"
 #include "abbe/tasks/verify.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "figures.hpp"
+#include "identified_model.hpp"
 #include "same_machine.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
@@ -32,6 +35,7 @@ using nlohmann::json;
 
 struct VerifyCommand : VerifyArguments {
   std::string socket = DaemonSocket{}.socket;
+  std::string pdf;
   bool live_points = false;
   std::size_t count = 0;
   bool json = false;
@@ -170,12 +174,18 @@ json verification_json(const Verification& v) {
   return object;
 }
 
-/// report.html and grid.csv, of one model.
-Result<void> write_outputs(const std::filesystem::path& folder, const Verification& v) {
-  if (folder.empty() || v.models.size() > 1) return {};
-  ABBE_TRY(create_folder(folder));
-  ABBE_TRY(replace_file(folder / "grid.csv", to_grid_csv(v.comparison())));
-  return replace_file(folder / "report.html", verification_report(v));
+/// report.html and grid.csv, and the report as PDF, of one model.
+Result<void> write_outputs(const VerifyCommand& arguments, const Verification& v,
+                           const Progress& progress) {
+  if (v.models.size() > 1) return {};
+  const std::string page = verification_report(v);
+  if (!arguments.out.empty()) {
+    const std::filesystem::path folder = arguments.out;
+    ABBE_TRY(create_folder(folder));
+    ABBE_TRY(replace_file(folder / "grid.csv", to_grid_csv(v.comparison())));
+    ABBE_TRY(replace_file(folder / "report.html", page));
+  }
+  return arguments.pdf.empty() ? Result<void>{} : write_pdf(page, arguments.pdf, progress);
 }
 
 void print(const Verification& v, const VerifyCommand& arguments) {
@@ -186,7 +196,15 @@ void print(const Verification& v, const VerifyCommand& arguments) {
                (std::filesystem::path(arguments.out) / "report.html").string());
 }
 
+/// Before points are measured.
+Result<void> check_pdf(const VerifyCommand& arguments) {
+  if (arguments.pdf.empty()) return {};
+  if (arguments.models.size() > 1) return fail(ErrorCode::Usage, "--pdf is for one model");
+  return require_place_of(arguments.pdf);
+}
+
 int run(const VerifyCommand& arguments) {
+  if (const auto possible = check_pdf(arguments); !possible) return report(possible.error());
   std::optional<Error> cut_short;
   ProgressBar bar;
   const auto found = verify_models(arguments, cut_short, bar.progress());
@@ -195,8 +213,9 @@ int run(const VerifyCommand& arguments) {
     const int code = report(found.error());
     return cut_short ? report(*cut_short) : code;
   }
-  if (const auto written = write_outputs(arguments.out, *found); !written)
-    return report(written.error());
+  const auto written = write_outputs(arguments, *found, bar.progress());
+  bar.clear();
+  if (!written) return report(written.error());
   print(*found, arguments);
   if (cut_short) return report(*cut_short);
   const bool worse = std::ranges::any_of(found->models, [](const ModelAtPoints& one) {
@@ -259,6 +278,7 @@ void add_options(CLI::App& command, VerifyCommand& arguments) {
       "-o,--out", arguments.out,
       "folder for report.html and grid.csv, and for verification.csv with the points of\n"
       "--recording or --live; created if needed. Several models: only verification.csv, of --live");
+  add_pdf_option(command, arguments.pdf);
 }
 
 }  // namespace

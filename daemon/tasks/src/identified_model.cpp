@@ -11,6 +11,8 @@
 #include "abbe/report/model_report.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/forced_use.hpp"
+#include "abbe/tasks/output_files.hpp"
+#include "abbe/tasks/pdf_converter.hpp"
 
 namespace abbe::daemon {
 
@@ -52,10 +54,12 @@ Result<ReportSubject> kept(const ResultPlace& place, const ModelDocument& docume
   return report_subject(*store, *id);
 }
 
-Result<void> write_page(const std::filesystem::path& folder, const ReportSubject& subject) {
-  const auto page = model_report(subject);
+/// report.html; returns it.
+Result<std::string> write_page(const std::filesystem::path& folder, const ReportSubject& subject) {
+  auto page = model_report(subject);
   ABBE_TRY(page);
-  return replace_file(folder / "report.html", *page);
+  ABBE_TRY(replace_file(folder / "report.html", *page));
+  return page;
 }
 
 /// A model that is in no store.
@@ -69,7 +73,9 @@ ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdic
 }  // namespace
 
 Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& identified,
-                            const calib::Verdict& verdict, const ResultFiles& more) {
+                            const calib::Verdict& verdict, const ResultFiles& more,
+                            const Progress& progress) {
+  if (!place.pdf.empty()) ABBE_TRY(require_place_of(place.pdf));
   ModelDocument document = identified;
   document.verdict = model_verdict(verdict);
   const std::filesystem::path folder = place.out;
@@ -78,11 +84,15 @@ Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& ident
   for (const auto& [name, text] : more) ABBE_TRY(replace_file(folder / name, text));
 
   // Before the store: a model that cannot be reported is not kept, and the error says so.
-  ABBE_TRY(write_page(folder, judged(document, verdict)));
-  if (place.keep.empty()) return {};
-  const auto subject = kept(place, document, verdict);
-  ABBE_TRY(subject);
-  return write_page(folder, *subject);
+  auto page = write_page(folder, judged(document, verdict));
+  ABBE_TRY(page);
+  if (!place.keep.empty()) {
+    const auto subject = kept(place, document, verdict);
+    ABBE_TRY(subject);
+    page = write_page(folder, *subject);
+    ABBE_TRY(page);
+  }
+  return place.pdf.empty() ? Result<void>{} : write_pdf(*page, place.pdf, progress);
 }
 
 nlohmann::json verdict_json(const calib::Verdict& verdict) {

@@ -1,4 +1,4 @@
-#include "pdf_converter.hpp"
+#include "abbe/tasks/pdf_converter.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -105,10 +105,11 @@ std::optional<pid_t> start_converter(const std::vector<std::string>& words) {
 }
 
 /// True if the process ends with exit code 0 in time; else it is killed with its children.
-bool succeeds(pid_t child) {
+bool succeeds(pid_t child, const Progress& progress) {
   constexpr std::chrono::milliseconds kPoll{50};
   constexpr std::chrono::seconds kMost{180};
-  const auto deadline = std::chrono::steady_clock::now() + kMost;
+  constexpr std::chrono::duration<double> kUsual{10.0};
+  const auto begin = std::chrono::steady_clock::now(), deadline = begin + kMost;
   for (int status = 0;;) {
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
     if (ended == child) return WIFEXITED(status) && WEXITSTATUS(status) == 0;
@@ -118,13 +119,15 @@ bool succeeds(pid_t child) {
       ::waitpid(child, &status, 0);
       return false;
     }
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+    progress.show("making the PDF", taken / (taken + kUsual));
     std::this_thread::sleep_for(kPoll);
   }
 }
 
 }  // namespace
 
-Result<void> write_pdf(const std::string& html, const fs::path& pdf) {
+Result<void> write_pdf(const std::string& html, const fs::path& pdf, const Progress& progress) {
   const WorkFolder work;
   if (work.path().empty())
     return fail(ErrorCode::Io, fmt::format("make a temporary folder: {}", std::strerror(errno)));
@@ -137,7 +140,7 @@ Result<void> write_pdf(const std::string& html, const fs::path& pdf) {
   ABBE_TRY(replace_file(page, html));
 
   const auto child = start_converter(words);
-  const bool done = child && succeeds(*child);
+  const bool done = child && succeeds(*child, progress);
   const auto bytes = done ? read_regular_file(made) : Result<std::string>{std::string{}};
   if (!bytes || !bytes->starts_with("%PDF"))
     return fail(ErrorCode::Io, fmt::format("--pdf: {} made no PDF in 3 minutes", words.front()));

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "abbe/base/local_time.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/report/html_report.hpp"
 #include "abbe/report/sections.hpp"
@@ -51,6 +52,19 @@ std::size_t places_improved(const verify::Comparison& c) {
   for (std::size_t i = 0; i < c.inside.size(); ++i)
     improved += c.residual_after_m[i].norm() < c.residual_before_m[i].norm() ? 1 : 0;
   return improved;
+}
+
+void add_identity(HtmlReport& page, const Verification& v) {
+  const ModelDocument& document = v.models.front().model.document;
+  const std::string measured = v.inputs.empty() ? "at the running machine" : v.inputs.front().name;
+  page.facts(
+      {{"machine", shortened(document.machine)},
+       {"model", model_id(document)},
+       {"model identified", local_time_text(document.created)},
+       {"measured points", shortened(measured)},
+       {"date, instrument, operator, temperature",
+        "not known: points have none (write them beside the signature)"},
+       {"limit", "not stated: neither pass nor fail (abbe report --details judges limits)"}});
 }
 
 void add_verdict(HtmlReport& page, const Verification& v) {
@@ -293,8 +307,14 @@ std::optional<std::string> why_no_ratio(const verify::Comparison& c) {
 std::string verification_report(const Verification& v) {
   const ModelDocument& document = v.models.front().model.document;
   HtmlReport page(fmt::format("{}: verification of a model", document.machine));
+  add_footer(page, document);
+  page.begin_front();
+  add_identity(page, v);
   add_verdict(page, v);
   add_left(page, v);
+  add_signature(page);
+  page.end_front();
+  page.page_break();
   add_farthest(page, v);
   add_ratio(page, v.comparison());
   add_planes(page, v);

@@ -14,9 +14,9 @@
 #include "abbe/report/model_report.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/output_files.hpp"
+#include "abbe/tasks/pdf_converter.hpp"
 #include "argument_checks.hpp"
 #include "certificate_file.hpp"
-#include "pdf_converter.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -191,7 +191,8 @@ Result<MadeReport> make_report(const ReportArguments& arguments, const ShowLeftO
                     .dcc = arguments.dcc};
 }
 
-Result<void> write_report(const MadeReport& report, const ShowWritten& show_written) {
+Result<void> write_report(const MadeReport& report, const ShowWritten& show_written,
+                          const Progress& progress) {
   const auto show = [&](const std::string& file) {
     if (show_written) show_written(file);
   };
@@ -202,7 +203,7 @@ Result<void> write_report(const MadeReport& report, const ShowWritten& show_writ
     show(report.dcc);
   }
   if (report.pdf.empty()) return {};
-  ABBE_TRY(write_pdf(report.page, report.pdf));
+  ABBE_TRY(write_pdf(report.page, report.pdf, progress));
   show(report.pdf);
   return {};
 }

@@ -11,6 +11,7 @@
 #include "abbe/calib/model/gate.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/tasks/progress.hpp"
 
 namespace abbe::daemon {
 
@@ -43,17 +44,19 @@ struct ResultPlace {
   std::string out;      ///< folder, created if needed
   std::string keep;     ///< store, or empty
   std::string command;  ///< recorded in the store as reason, "abbe identify otf"
+  std::string pdf{};    ///< the report also as this file; or empty
 };
 /// File name to text.
 using ResultFiles = std::map<std::string, std::string>;
 
 /// Writes model.json with the verdict, `more` and report.html, adds the model to the store with the
 /// user, and writes report.html again. Nothing is stored if a file cannot be written or the report
-/// cannot be made.
+/// cannot be made. The PDF comes last: its converter may be missing or fail (Io).
 /// With a store it is the report that `abbe report` makes of the stored model; else it has the
 /// verdict, and states that the model is not active. Error Io, or that of the store.
 [[nodiscard]] Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,
-                                          const calib::Verdict& verdict, const ResultFiles& more);
+                                          const calib::Verdict& verdict, const ResultFiles& more,
+                                          const Progress& progress = {});
 
 /// Whether the gate accepts the model, the reasons if not, and the notes.
 [[nodiscard]] nlohmann::json verdict_json(const calib::Verdict& verdict);

@@ -10,6 +10,7 @@
 #include "abbe/report/verdict_in_words.hpp"
 #include "abbe/tasks/forced_use.hpp"
 #include "abbe/tasks/model_source.hpp"
+#include "abbe/tasks/progress.hpp"
 
 namespace abbe::daemon {
 
@@ -45,6 +46,7 @@ using ShowWritten = std::function<void(const std::string& file)>;
                                              const ShowLeftOut& show_left_out);
 
 /// The PDF comes last: its converter may be missing or fail (Io).
-[[nodiscard]] Result<void> write_report(const MadeReport& report, const ShowWritten& show_written);
+[[nodiscard]] Result<void> write_report(const MadeReport& report, const ShowWritten& show_written,
+                                        const Progress& progress = {});
 
 }  // namespace abbe::daemon

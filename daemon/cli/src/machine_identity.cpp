@@ -16,8 +16,8 @@
 #include <string>
 
 #include "abbe/base/json_text.hpp"
+#include "abbe/base/local_time.hpp"
 #include "abbe/base/printable.hpp"
-#include "abbe/base/utc_text.hpp"
 #include "abbe/base/wall_clock.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/result/try.hpp"
@@ -49,7 +49,7 @@ void print_identity(const MachineIdentity& identity, const std::string& doubt) {
   fmt::print("machine_id  {}\n", identity.machine_id);
   fmt::print("state       {}\n", doubt.empty() ? "confirmed" : "not confirmed: " + doubt);
   for (const auto& e : identity.events)
-    fmt::print("{:<10}  {}  {}  by {}{}\n", text_of(e.action), to_text(e.when).substr(0, 19),
+    fmt::print("{:<10}  {}  {}  by {}{}\n", text_of(e.action), local_time_text(e.when),
                printable_line(e.machine_id), printable_line(e.who),
                e.why.empty() ? "" : ": " + printable_line(e.why));
 }

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/json_text.hpp"
+#include "abbe/base/local_time.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
@@ -52,17 +54,17 @@ nlohmann::json to_json(const StoreEntry& entry) {
 }
 
 void print_table(const std::vector<StoreEntry>& entries) {
-  constexpr std::size_t kSeconds = 19;  // "2024-05-17T08:30:00"
-  fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", "id", "added (UTC)", "method", "machine",
+  std::size_t width = 0;  // of the time: local and UTC, or UTC alone
+  for (const auto& entry : entries) width = std::max(width, local_time_text(entry.added).size());
+  fmt::print("{:<16}  {:<{}}  {:<6}  {:<20}  {}\n", "id", "added", width, "method", "machine",
              "state");
   for (const auto& entry : entries) {
     auto state = state_of(entry);
     if (entry.active) state = coloured(state, kGreen, STDOUT_FILENO);
     if (!entry.fault.empty())
       state = coloured(state, kRed, STDOUT_FILENO) + ": " + printable_line(entry.fault);
-    fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id,
-               to_text(entry.added).substr(0, kSeconds), entry.method,
-               printable_line(entry.machine), state);
+    fmt::print("{:<16}  {:<{}}  {:<6}  {:<20}  {}\n", entry.id, local_time_text(entry.added), width,
+               entry.method, printable_line(entry.machine), state);
     if (entry.simulated.value_or(false))
       fmt::print("{:18}{}\n", "", coloured("simulated devices", kYellow, STDOUT_FILENO));
     for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", printable_line(reason));
@@ -90,14 +92,14 @@ int list(const ModelStoreArguments& arguments) {
 
 void print_entry(const StoreEntry& entry) {
   fmt::print("id          {}\nstate       {}\nadded       {}\n", entry.id, state_of(entry),
-             to_text(entry.added));
+             local_time_text(entry.added));
   for (const auto& reason : entry.reasons) fmt::print("            {}\n", printable_line(reason));
 }
 
 void print_model(const ModelDocument& document) {
   const auto& s = document.statistics;
   fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, datum {}\n",
-             to_text(document.created), printable_line(document.machine),
+             local_time_text(document.created), printable_line(document.machine),
              document.model.chain().text(), document.method, document.estimator,
              name(document.model.datum()));
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",

@@ -170,11 +170,11 @@ Result<void> add_front(HtmlReport& page, const ReportSubject& subject,
   const bool all_limits = judged->size() <= kMostLimits;
   add_tolerance(page, *judged);
   add_result(page, subject, values);
+  const CertificateDetails& d = subject.details;
+  add_signature(page, d.role.empty() ? d.person : d.person + ", " + d.role, d.issue_date);
   add_before_and_after(
       page, document.model,
       document.run ? document.run->held_out_cells : std::vector<RunFigures::HeldOutCell>{});
-  const CertificateDetails& d = subject.details;
-  add_signature(page, d.role.empty() ? d.person : d.person + ", " + d.role, d.issue_date);
   page.end_front();
   page.page_break();
   if (!all_reasons) add_verdict_of(page, subject);

@@ -471,9 +471,11 @@ TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
     session.judged("model", passed, "verdict", drive.now());
     std::vector<SessionState> track;
     for (const auto& event : session.take_events()) track.push_back(event.status.state);
-    EXPECT_EQ(track, (std::vector{SessionState::Warming, SessionState::Acquiring,
-                                  SessionState::Identifying, SessionState::Judged,
-                                  passed ? SessionState::Active : SessionState::Refused}));
+    // READY is an event of its own.
+    EXPECT_EQ(track,
+              (std::vector{SessionState::Warming, SessionState::Warming, SessionState::Acquiring,
+                           SessionState::Identifying, SessionState::Judged,
+                           passed ? SessionState::Active : SessionState::Refused}));
   }
 }
 

@@ -23,17 +23,19 @@ class AStart : public ::testing::Test {
   void take(nanoseconds duration, const Vector3& from_m,
             const Vector3& velocity_m_per_s = {0, 0, 0}) {
     const HostTime begin = now_;
+    const bool stands = velocity_m_per_s.norm() == 0.0 && (from_m - kFirst).norm() < 2e-3;
+    if (!stands) stands_since_.reset();
+    if (stands && !stands_since_) stands_since_ = begin;
     for (; now_ - begin < duration; now_ += kInterval, ++count_) {
       const double s = std::chrono::duration<double>(now_ - begin).count();
       const bool known =
-          std::fmod(0.5 + static_cast<double>(count_) * axes_share_, 1.0) < axes_share_;
-      const bool stands = velocity_m_per_s.norm() == 0.0 && (from_m - kFirst).norm() < 2e-3;
+          std::fmod(0.505 + static_cast<double>(count_) * axes_share_, 1.0) < axes_share_;
       check_.take(
           {.time = now_,
            .usable = usable_,
            .settled = settled_,
            .q_m = known ? std::optional<Vector3>(from_m + s * velocity_m_per_s) : std::nullopt,
-           .stood = stands ? now_ - begin : nanoseconds{}});
+           .stood = stands ? now_ - *stands_since_ : nanoseconds{}});
     }
   }
   [[nodiscard]] std::string unmet() const {
@@ -46,6 +48,7 @@ class AStart : public ::testing::Test {
   static inline const Vector3 kFirst{0.1, 0, 0}, kSecond{0.4, 0, 0};
   StartCheck check_{{.first_m = kFirst, .second_m = kSecond, .stand_before = milliseconds{200}}};
   HostTime now_{std::chrono::seconds{100}};
+  std::optional<HostTime> stands_since_;  // at the first vertex
   std::size_t count_ = 0;
   double axes_share_ = 1.0;
   bool usable_ = true, settled_ = true;

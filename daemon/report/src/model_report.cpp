@@ -115,8 +115,6 @@ Result<std::string> model_report(const ReportSubject& subject) {
   add_not_estimable(page, *values);
   add_fit(page, document);
   if (document.run) add_held_out(page, *document.run);
-
-  page.page_break();
   add_value_curves(page, *values);
   add_field(page, document.model, values->standard.box);
   add_parameters(page, document.model);

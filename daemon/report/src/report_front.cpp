@@ -131,7 +131,7 @@ std::vector<std::vector<std::string>> rows_of(const std::vector<JudgedValue>& ju
 }
 
 const std::vector<std::string> kColumns{"", "value \u00b1 U (k = 2)", "limit", "verdict"};
-constexpr std::size_t kMostLimits = 5;
+constexpr std::size_t kMostLimits = 3;
 
 /// The limits that decide come first.
 void sort_by_verdict(std::vector<JudgedValue>& judged) {

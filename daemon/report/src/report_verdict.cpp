@@ -136,7 +136,7 @@ void add_verdict_of(HtmlReport& page, const ReportSubject& subject) {
 }
 
 bool add_short_verdict_of(HtmlReport& page, const ReportSubject& subject) {
-  constexpr std::size_t kMostOfReasons = 500, kMostOfNotes = 700;
+  constexpr std::size_t kMostOfReasons = 300, kMostOfNotes = 300;
   const VerdictInWords all = verdict_in_words(subject);
   VerdictInWords shown = all;
   shown.reasons = first_of(all.reasons, kMostOfReasons);

@@ -50,7 +50,7 @@ TEST_F(CliHelp, AGroupOfCommandsAloneListsThem) {
 }
 
 TEST_F(CliHelp, AnErrorPointsToTheHelpOfItsCommand) {
-  const auto ran = abbe("identify otf --wrong");
+  const auto ran = abbe("identify otf --out o --wrong");
   EXPECT_EQ(ran.exit, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("--wrong"), HasSubstr("see `abbe identify otf --help`")));
   EXPECT_THAT(abbe("model eval").err, HasSubstr("see `abbe model eval --help`"));

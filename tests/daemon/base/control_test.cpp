@@ -53,8 +53,8 @@ TEST_F(Control, AnswersARequest) {
   EXPECT_EQ((*answer)["heard"]["path"], json({1.5, 2.5}));
 }
 
-/// What a user without any rights is told who asks the daemon at `socket`, in a process of its own.
-std::string told_to_nobody(const std::filesystem::path& socket) {
+/// The error of a user without any rights who asks the daemon at `socket`, from its own process.
+std::string error_for_nobody(const std::filesystem::path& socket) {
   std::array<int, 2> ends{};
   EXPECT_EQ(::pipe(ends.data()), 0);
   const pid_t child = ::fork();
@@ -63,16 +63,16 @@ std::string told_to_nobody(const std::filesystem::path& socket) {
     const bool left = ::geteuid() != 0 || (::setgroups(0, nullptr) == 0 && ::setgid(kNobody) == 0 &&
                                            ::setuid(kNobody) == 0);
     const auto answer = ask_daemon(socket, {{"do", "status"}});
-    const std::string told = !left ? "still root" : answer ? "an answer" : answer.error().text;
-    (void)!::write(ends[1], told.data(), told.size());
+    const std::string text = !left ? "still root" : answer ? "an answer" : answer.error().text;
+    (void)!::write(ends[1], text.data(), text.size());
     ::_exit(0);
   }
   ::close(ends[1]);
-  std::array<char, 4096> text{};
-  const ssize_t length = ::read(ends[0], text.data(), text.size());
+  std::array<char, 4096> received{};
+  const ssize_t length = ::read(ends[0], received.data(), received.size());
   ::close(ends[0]);
   ::waitpid(child, nullptr, 0);
-  return {text.data(), length > 0 ? static_cast<std::size_t>(length) : 0};
+  return {received.data(), length > 0 ? static_cast<std::size_t>(length) : 0};
 }
 
 TEST_F(Control, AUserWithoutRightsIsToldWhichGroupItNeeds) {
@@ -80,12 +80,13 @@ TEST_F(Control, AUserWithoutRightsIsToldWhichGroupItNeeds) {
   ASSERT_TRUE(server);
   namespace fs = std::filesystem;
   fs::permissions(socket().parent_path(), fs::perms::none);
-  const std::string told = told_to_nobody(socket());
+  const std::string error = error_for_nobody(socket());
   fs::permissions(socket().parent_path(), fs::perms::owner_all);
   const struct group* own = ::getgrgid(::getegid());
   ASSERT_NE(own, nullptr);
-  EXPECT_NE(told.find(std::string("usermod -aG ") + own->gr_name + " "), std::string::npos) << told;
-  EXPECT_EQ(told.find("is abbed running?"), std::string::npos) << told;
+  EXPECT_NE(error.find(std::string("usermod -aG ") + own->gr_name + " "), std::string::npos)
+      << error;
+  EXPECT_EQ(error.find("is abbed running?"), std::string::npos) << error;
 }
 
 TEST_F(Control, ARequestLargerThanAnyBufferArrivesWhole) {

@@ -33,13 +33,13 @@ TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
 }
 
 /// The reasons of the events so far.
-std::vector<std::string> told_by(CalibrationSession& session) {
-  std::vector<std::string> told;
-  for (const SessionEvent& event : session.take_events()) told.push_back(event.status.reason);
-  return told;
+std::vector<std::string> reasons_of(CalibrationSession& session) {
+  std::vector<std::string> reasons;
+  for (const SessionEvent& event : session.take_events()) reasons.push_back(event.status.reason);
+  return reasons;
 }
 
-TEST(CalibrationSession, TellsWhenTheMachineMayDriveOff) {
+TEST(CalibrationSession, ReportsWhenTheMachineMayDriveOff) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -48,14 +48,14 @@ TEST(CalibrationSession, TellsWhenTheMachineMayDriveOff) {
   EXPECT_FALSE(session.status().start->ready);
   drive.stand(kPath[0], 1s);
   EXPECT_TRUE(session.status().start->ready);
-  EXPECT_THAT(told_by(session), ElementsAre(StartsWith("waiting for the machine to stand"),
-                                            "READY: drive the path now"));
+  EXPECT_THAT(reasons_of(session), ElementsAre(StartsWith("waiting for the machine to stand"),
+                                               "READY: drive the path now"));
   drive.move(kPath[1]);
   EXPECT_FALSE(session.status().start);
-  EXPECT_THAT(told_by(session), ElementsAre("driving the path"));
+  EXPECT_THAT(reasons_of(session), ElementsAre("driving the path"));
 }
 
-TEST(CalibrationSession, TellsAtOnceThatTheStartWasMissed) {
+TEST(CalibrationSession, ReportsAtOnceThatTheStartWasMissed) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -63,7 +63,7 @@ TEST(CalibrationSession, TellsAtOnceThatTheStartWasMissed) {
   drive.move({0.02, 0, 0});
   ASSERT_EQ(session.status().state, SessionState::Warming);
   EXPECT_TRUE(session.status().start->missed);
-  EXPECT_THAT(told_by(session),
+  EXPECT_THAT(reasons_of(session),
               ElementsAre(StartsWith("waiting"), StartsWith("start missed: the machine has left")));
 }
 

@@ -51,7 +51,7 @@ class StartCheck {
   /// The machine has left the first vertex along its first leg, and the run has not begun. True
   /// until it stands at the first vertex again.
   [[nodiscard]] bool missed() const noexcept { return !missed_.empty(); }
-  /// What the operator is told: what to wait for, that the machine may drive off, or what was
+  /// Message for the operator: what to wait for, that the machine may drive off, or what was
   /// missing when it drove off.
   [[nodiscard]] std::string text() const;
   /// Conditions in the order in which the operator meets them: tracker, axes, position,

@@ -16,9 +16,9 @@ function nextTouch(next) {
   const of = next.measurement ? `measurement ${next.measurement}` : `position ${next.position}`;
   const features = next.features ?? [];
   const touched = features.filter((f) => f.touched >= f.points).length;
-  return [h("p", { class: "large" }, `Next: ${next.on}`),
-    h("p", {}, `${of}, ${next.touched} of ${next.points} points touched`,
-      features.length ? `, ${touched} of ${features.length} balls and blocks of this position complete` : "")];
+  return [h("p", {}, h("strong", { class: "large" }, `Next: ${next.on}`), ` of ${of}; `,
+    `${next.touched} of ${next.points} points touched`,
+    features.length ? `; ${touched} of ${features.length} balls and blocks of this position are complete` : "")];
 }
 
 /** What a run along a path needs before the machine may drive off. */

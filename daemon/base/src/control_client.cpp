@@ -56,8 +56,7 @@ std::string advice(const std::filesystem::path& socket) {
     return "is abbed running?";
   return fmt::format(
       "this user is not in the group {0}: run `sudo usermod -aG {0} $USER` and log in again, or "
-      "use "
-      "sudo",
+      "use sudo",
       group_name(seen.st_gid));
 }
 

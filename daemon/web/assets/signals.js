@@ -8,7 +8,7 @@ import { listen, state } from "./server.js";
 const kKept = "abbe-signals";
 let sound = null;
 
-export const on = () => localStorage.getItem(kKept) === "on";
+const on = () => localStorage.getItem(kKept) === "on";
 
 /** Two short tones; deeper for what is wrong. */
 function play(isWrong) {
@@ -38,7 +38,7 @@ function signal(text, isWrong) {
 }
 
 /** What a status asks of the person beside the machine: [text, is it wrong]; null: nothing. */
-export function demand({ session }) {
+function demand({ session }) {
   if (session.state === "refused") return [`Calibration refused: ${session.reason}`, true];
   if (session.start?.missed) return [session.reason, true];
   if (session.start?.ready) return ["READY: drive the path now", false];

@@ -32,7 +32,7 @@ class DdsCrowd : public ShopFloor {
  protected:
   /// The loopback profile as a site may have written it before: peers up to participant 130, and no
   /// mutation_tries.
-  DdsCrowd() {
+  DdsCrowd() : ShopFloor(2) {
     std::ifstream shipped{ABBE_LOOPBACK_PROFILE};
     std::string text{std::istreambuf_iterator<char>{shipped}, {}};
     const auto replace = [&text](const std::string& from, const std::string& to) {

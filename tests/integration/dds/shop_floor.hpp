@@ -20,7 +20,8 @@ namespace abbe::test {
 
 class ShopFloor : public testing::Test {
  protected:
-  ShopFloor() {
+  /// `domains`: how many that follow each other no other test may use.
+  explicit ShopFloor(int domains = 1) : domain_(domains) {
     ::setenv("CYCLONEDDS_URI", "file://" ABBE_CYCLONE_CONFIG, 1);
     std::string name = testing::TempDir() + "abbe-dds-XXXXXX";
     directory_ = ::mkdtemp(name.data());

@@ -64,7 +64,8 @@ constexpr std::array kExamples{
     Example{"replay", "run.mcap --speed 10"},
     Example{"evemu", "--machine machine.toml --calibrator-out calibrator.toml"},
     Example{"mfb", "--seed 3 --drift-um 2 -o run"},
-    Example{"bar", "--bar-seed 3 --repeats 5 -o calibration"}};
+    Example{"bar", "--bar-seed 3 --repeats 5 -o calibration"},
+    Example{"set", "otf -o first"}};
 
 /// Puts an example before the footer of every subcommand.
 void add_examples(CLI::App& app) {
@@ -83,7 +84,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "abbe-sim " ABBE_VERSION);
   const std::vector<Subcommand> commands{add_run(app),    add_truth(app), add_machine(app),
                                          add_replay(app), add_evemu(app), add_mfb(app),
-                                         add_bar(app)};
+                                         add_bar(app),    add_set(app)};
   add_examples(app);
 
   try {

@@ -28,6 +28,10 @@ struct Subcommand {
 [[nodiscard]] Subcommand add_evemu(CLI::App& app);
 [[nodiscard]] Subcommand add_mfb(CLI::App& app);
 [[nodiscard]] Subcommand add_bar(CLI::App& app);
+[[nodiscard]] Subcommand add_set(CLI::App& app);
+
+/// The files of `abbe-sim mfb` with the default of every option. An exit code.
+[[nodiscard]] int write_bar_set(const std::string& folder);
 
 /// Prints "abbe-sim: " and the text of the error to stderr; returns the exit code of the error.
 int report(const Error& error);

@@ -7,18 +7,15 @@
 #include <iterator>
 #include <memory>
 
-#include "abbe/sim/noise.hpp"
 #include "abbe/sim/simulation.hpp"
 #include "commands.hpp"
 #include "files.hpp"
+#include "reference_points.hpp"
 #include "setup_file.hpp"
 #include "touching_loop.hpp"
 
 namespace abbe::sim {
 namespace {
-
-constexpr double kMmPerM = 1e3;
-constexpr double kUmPerM = 1e6;
 
 struct EvemuOptions {
   SetupChoices choices;
@@ -55,25 +52,6 @@ Result<LoadedSetup> load(const EvemuOptions& options) {
   return setup;
 }
 
-std::string error_row(const TruthMachine& truth, const Eigen::Vector3d& q_m,
-                      const Eigen::Vector3d& V_ball1_m,
-                      const Eigen::Vector3d& noise_m = Eigen::Vector3d::Zero()) {
-  const Eigen::Vector3d q_mm = kMmPerM * q_m;
-  const Eigen::Vector3d V_um = kUmPerM * (error_m(truth, q_m) - V_ball1_m + noise_m);
-  return fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", q_mm.x(), q_mm.y(),
-                     q_mm.z(), V_um.x(), V_um.y(), V_um.z());
-}
-
-/// Scale readings at the centres of the balls, for all positions of the array.
-std::vector<Eigen::Vector3d> ball_readings_m(const TruthMachine& truth, const BallArray& array) {
-  std::vector<Eigen::Vector3d> readings;
-  for (const auto& T_machine_array : reference_positions()) {
-    for (const ArrayBall& ball : array.balls)
-      readings.push_back(reading_at_m(truth, T_machine_array * ball.centre_m));
-  }
-  return readings;
-}
-
 /// V minus V at ball 1, as CSV, on a grid over the smallest box that contains all balls.
 std::string truth_csv(const TruthMachine& truth, const BallArray& array) {
   const Eigen::Vector3d step_m = Eigen::Vector3d(0.1, 0.05, 0.01) / 3.0;
@@ -101,24 +79,6 @@ std::string truth_csv(const TruthMachine& truth, const BallArray& array) {
   return text;
 }
 
-/// V at the balls of all positions as an independent instrument measures it, in the format of
-/// errors.csv.
-std::string reference_csv(const TruthMachine& truth, const BallArray& array, double u_m,
-                          std::uint64_t seed) {
-  const auto readings = ball_readings_m(truth, array);
-  const Eigen::Vector3d V_ball1_m = error_m(truth, readings.front());
-  std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    const auto draw = [&](std::size_t k) {
-      return u_m * gaussian(seed, NoiseStream::Range, 3 * i + k);
-    };
-    const std::size_t balls = array.balls.size();
-    text += fmt::format("{},{},", i / balls + 1, i % balls + 1) +
-            error_row(truth, readings[i], V_ball1_m, {draw(0), draw(1), draw(2)});
-  }
-  return text;
-}
-
 Result<void> write_files(const EvemuOptions& options, const LoadedSetup& setup,
                          const BallArray& array) {
   const TruthMachine& truth = setup.simulation.truth;
@@ -130,7 +90,7 @@ Result<void> write_files(const EvemuOptions& options, const LoadedSetup& setup,
       .and_then([&] { return write(options.truth_out, [&] { return truth_csv(truth, array); }); })
       .and_then([&] {
         return write(options.reference_out, [&] {
-          return reference_csv(truth, array, options.u_reference_um / kUmPerM, setup.touching.seed);
+          return reference_csv(truth, array, options.u_reference_um / 1e6, setup.touching.seed);
         });
       });
 }

@@ -16,6 +16,7 @@
 #include "commands.hpp"
 #include "setup_file.hpp"
 #include "touching_loop.hpp"
+#include "verification_points.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -59,30 +60,6 @@ Result<mfb::ProbingOptions> stated_options(const MfbOptions& options) {
   auto stated = probing_of(options);
   if (stated) stated->drift_m = options.drift_um * kFromMicro;
   return stated;
-}
-
-/// Readings on a grid over the travel and the true place of the tip there, for `abbe verify`.
-std::string verification_csv(TruthMachine machine, const Eigen::Vector3d& tool_offset_m) {
-  constexpr int kPerAxis = 6;
-  machine.target_offset_m = tool_offset_m;
-  std::string text = fmt::format(
-      "# the true place of the tip of the tool with the offset {:g},{:g},{:g} mm\n"
-      "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n",
-      tool_offset_m.x() / kFromMilli, tool_offset_m.y() / kFromMilli,
-      tool_offset_m.z() / kFromMilli);
-  const auto at = [&](Axis axis, int i) {
-    const AxisRange& r = machine.axis(axis).range;
-    return r.min_m + (r.max_m - r.min_m) * i / (kPerAxis - 1);
-  };
-
-  for (int i = 0; i < kPerAxis * kPerAxis * kPerAxis; ++i) {
-    const Eigen::Vector3d q_m(at(Axis::X, i / (kPerAxis * kPerAxis)),
-                              at(Axis::Y, i / kPerAxis % kPerAxis), at(Axis::Z, i % kPerAxis));
-    const Eigen::Vector3d q_mm = q_m / kFromMilli, p_mm = position_m(machine, q_m) / kFromMilli;
-    text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", q_mm.x(), q_mm.y(),
-                        q_mm.z(), p_mm.x(), p_mm.y(), p_mm.z());
-  }
-  return text;
 }
 
 std::string sim_toml(const MfbOptions& options) {
@@ -130,11 +107,13 @@ int run(const MfbOptions& options) {
   if (!stated) return report(stated.error());
   const mfb::TrueBar bar = bar_of(options);
   const TruthMachine machine = cube_machine(options);
+  TruthMachine with_first_tool = machine;
   const auto plan =
       mfb::reference_plan(kPlans.at(options.plan), kPasses.at(options.passes), options.length_m());
   auto probed = mfb::probe_bar(machine, bar, plan, simulated(*stated, options));
   if (!probed) return report(as_usage(probed.error()));
 
+  with_first_tool.target_offset_m = plan.front().tool_offset_m;
   const Eigen::Vector3d u_bar_m = kFromMicro * Eigen::Vector3d(options.u_bar_um.data());
   mfb::StatedBar calibrated = mfb::calibrated_bar(bar, u_bar_m, options.seed);
   if (options.exact) {
@@ -151,7 +130,7 @@ int run(const MfbOptions& options) {
        {"truth.csv", format_truth_csv(machine)},
        {"sim.toml", sim_toml(options)},
        {"truebar.csv", mfb::format_points_of_interest_csv(mfb::points_of_interest_m(bar))},
-       {"verification.csv", verification_csv(machine, plan.front().tool_offset_m)}});
+       {"verification.csv", verification_csv(with_first_tool)}});
   if (!written) return report(written.error());
   fmt::print("{} touches in {} passes; mean |V| {:.1f} um; files in {}\n", probed->touches.size(),
              plan.size(), mean_error_m(machine) / kFromMicro, options.folder);
@@ -192,11 +171,23 @@ void add_live_options(CLI::App& sub, LiveOptions& live) {
       ->needs(config);
 }
 
+MfbOptions standard_options() {
+  MfbOptions options;
+  options.mean_error_um = 40.0;
+  return options;
+}
+
 }  // namespace
 
+int write_bar_set(const std::string& folder) {
+  MfbOptions options = standard_options();
+  options.folder = folder;
+  return run(options);
+}
+
 Subcommand add_mfb(CLI::App& app) {
-  auto options = std::make_shared<MfbOptions>();  // lives as long as the command line's callbacks
-  options->mean_error_um = 40.0;
+  // lives as long as the command line's callbacks
+  auto options = std::make_shared<MfbOptions>(standard_options());
   CLI::App* sub = app.add_subcommand(
       "mfb",
       "a simulated machine measures a Multi-Feature Bar: bar.toml, plan.toml, points.csv and\n"

@@ -11,6 +11,7 @@
 #include "abbe/base/faults.hpp"
 #include "commands.hpp"
 #include "example_files.hpp"
+#include "run_program.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -98,12 +99,28 @@ int run_example(const std::string& name) {
 
 void add_example(CLI::App& parent, int& exit) {
   auto name = std::make_shared<std::string>();
+  auto set = std::make_shared<std::string>();
   auto* command = parent.add_subcommand(
       "example",
       "Print a commented example of a file that abbe reads; without a name, list the examples.\n"
       "Columns, units and signs of every file: docs/files.md");
-  command->add_option("NAME", *name, "name of the file: calibrator.toml");
-  command->callback([name, &exit] { exit = run_example(*name); });
+  auto* of_set =
+      command
+          ->add_option(
+              "--set", *set,
+              "otf, evemu, mfb or joint: writes the files of a simulated measurement, which "
+              "fit each\nother, into a new folder NAME, and prints the commands that use them")
+          ->check(CLI::IsMember({"otf", "evemu", "mfb", "joint"}));
+  command->add_option("NAME", *name,
+                      "name of the file: calibrator.toml; with --set: of the folder");
+  command->callback([name, set, of_set, &exit] {
+    exit =
+        of_set->count() == 0 ? run_example(*name)
+        : name->empty()
+            ? report({ErrorCode::Usage,
+                      fmt::format("--set {0} needs a folder: abbe example --set {0} FOLDER", *set)})
+            : report(exec_program({"sim", "set", *set, "--out", *name}));
+  });
 }
 
 }  // namespace abbe::daemon

@@ -1,14 +1,10 @@
 #include "abbe/cli/cli.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <exception>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,6 +17,7 @@
 #include "earlier_words.hpp"
 #include "examples.hpp"
 #include "known_commands.hpp"
+#include "run_program.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -51,26 +48,6 @@ std::string footer() {
 
 /// Subcommands that are separate programs, as with git.
 constexpr std::array<std::string_view, 3> kPrograms{"demo", "sim", "watch"};
-
-std::filesystem::path own_folder() {
-  std::error_code ignored;
-  return std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
-}
-
-/// Replaces this process by the program of the subcommand words[0], whose name is "abbe-" followed
-/// by words[0]. Returns only if the program cannot be run.
-Error exec_program(std::vector<std::string> words) {
-  const auto program = words[0] = fmt::format("abbe-{}", words[0]);
-  const auto beside = (own_folder() / program).string();
-  std::vector<char*> arguments;
-  arguments.reserve(words.size() + 1);
-  for (auto& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  ::execv(beside.c_str(), arguments.data());
-  ::execvp(program.c_str(), arguments.data());
-  return {ErrorCode::Io, fmt::format("run {}: neither in the folder of abbe nor in PATH: {}",
-                                     program, std::strerror(errno))};
-}
 
 void add_commands(CLI::App& app, int& exit) {
   add_status(app, exit);

@@ -135,8 +135,11 @@ void print_one(const Verification& v) {
              printable_line(document.machine), document.method);
   for (const std::string& caution : v.models.front().model.cautions)
     fmt::print("caution     {}\n", printable_line(caution));
+  const calib::Vector3 tool_mm = kMmPerM * v.models.front().tool_m;
   fmt::print("points      {}; {} of these places where the model is valid\n",
              shots_text(v.observations), v.inside);
+  fmt::print("tool        they count as points of the tool offset ({:g} {:g} {:g}) mm; --tool-mm\n",
+             tool_mm.x(), tool_mm.y(), tool_mm.z());
   fmt::print(
       "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with "
       "the model\n",

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <sstream>
+#include <vector>
 
 #include "abbe/config/config.hpp"
 #include "abbe/sim/path_motion.hpp"
@@ -90,6 +91,51 @@ TEST_F(ExampleFiles, OfTheSimulatorAreAccepted) {
     printed(name);
   const auto ran = abbe("sim truth --config sim.toml --truth truth.csv --points points.csv");
   EXPECT_EQ(ran.exit, 0) << ran.err;
+}
+
+/// The commands that `abbe example --set` prints, run as they are printed.
+class ExampleSet : public ExampleFiles, public ::testing::WithParamInterface<const char*> {
+ protected:
+  [[nodiscard]] std::vector<std::string> printed_commands() const {
+    const auto ran = abbe(fmt::format("example --set {} files", GetParam()));
+    EXPECT_EQ(ran.exit, 0) << ran.err;
+    std::vector<std::string> commands;
+    std::istringstream lines(ran.out);
+    for (std::string line; std::getline(lines, line);)
+      if (line.starts_with("  abbe ")) commands.push_back(line.substr(7));
+    return commands;
+  }
+};
+
+TEST_P(ExampleSet, GivesAModelThatMakesItsMachineBetter) {
+  const auto commands = printed_commands();
+  ASSERT_EQ(commands.size(), 2U);
+  const auto identified = test::run_abbe(folder_.path() / "files", commands[0]);
+  ASSERT_EQ(identified.exit, 0) << identified.out << identified.err;
+  EXPECT_THAT(identified.out, HasSubstr("would accept"));
+  const auto verified = test::run_abbe(folder_.path() / "files", commands[1]);
+  EXPECT_EQ(verified.exit, 0) << verified.err;
+  EXPECT_THAT(verified.out, HasSubstr("better with the model"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, ExampleSet, ::testing::Values("otf", "evemu", "mfb", "joint"));
+
+TEST_F(ExampleFiles, OfASetReplaceNoFile) {
+  std::filesystem::create_directory(folder_.path() / "own");
+  test::write_text(folder_.path() / "own" / "machine.toml", "mine");
+  const auto ran = abbe("example --set mfb own");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, HasSubstr("own: is not empty; state a new folder"));
+  EXPECT_EQ(test::text_of(folder_.path() / "own" / "machine.toml"), "mine");
+}
+
+TEST_F(ExampleFiles, OfASetNeedAKnownSetAndAFolder) {
+  const auto unknown = abbe("example --set otv files");
+  EXPECT_EQ(unknown.exit, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("otv"));
+  const auto nowhere = abbe("example --set otf");
+  EXPECT_EQ(nowhere.exit, 2);
+  EXPECT_THAT(nowhere.err, HasSubstr("abbe example --set otf FOLDER"));
 }
 
 TEST_F(ExampleFiles, AreListed) {

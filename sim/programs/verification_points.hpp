@@ -1,0 +1,14 @@
+#pragma once
+/// verification.csv of a simulated machine, for `abbe verify`.
+
+#include <string>
+
+#include "abbe/sim/truth_machine.hpp"
+
+namespace abbe::sim {
+
+/// Readings on a grid over the travel, and the true place of the target there, in machine
+/// coordinates.
+[[nodiscard]] std::string verification_csv(const TruthMachine& machine);
+
+}  // namespace abbe::sim

@@ -1,6 +1,7 @@
 // abbed: the daemon. Runs in the foreground, logs to stderr, notifies systemd when it is ready and
 // feeds its watchdog.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -98,7 +99,12 @@ int check(const std::string& file) {
   if (!checked) return refuse({ErrorCode::BadInput, checked.error().text, checked.error().details});
   if (auto usable = check_dds_keys(checked->config.dds); !usable) return refuse(usable.error());
 
-  fmt::print("{}: valid\n", file);
+  const auto& example = checked->of_the_example;
+  fmt::print("{}: valid{}\n", file,
+             example.empty()
+                 ? ""
+                 : fmt::format(", but still the example: {}; enter those of your machine",
+                               fmt::join(example, ", ")));
   for (const auto& line : summary_of(checked->config)) fmt::print("  {}\n", printable(line));
   if (!checked->warnings.empty()) fmt::print("warnings:\n");
   for (const auto& warning : checked->warnings) fmt::print("  {}\n", printable(warning));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <system_error>
@@ -149,6 +150,42 @@ void doubt_devices(Section& root, const Config& config) {
     root.child("daemon").fault("simulated", "the devices are those of abbe-sim, not of a machine");
 }
 
+// ---- The example ----
+
+/// Values of the examples abbed.toml and first_abbed.toml that no other machine has all of.
+constexpr std::string_view kExampleName = "mill 7", kExampleHost = "192.168.0.1";
+constexpr std::array<std::pair<double, double>, 3> kExampleTravel_m{
+    {{-0.3, 0.3}, {-0.25, 0.25}, {-0.4, 0.0}}};
+constexpr std::array kExampleTarget_m{0.02, -0.015, -0.12};
+
+bool has_example_travel(const MachineConfig& machine) {
+  return std::ranges::equal(machine.axes, kExampleTravel_m,
+                            [](const auto& axis, const auto& travel) {
+                              return std::abs(axis.min - travel.first) < 1e-9 &&
+                                     std::abs(axis.max - travel.second) < 1e-9;
+                            });
+}
+
+bool has_example_target(const MachineConfig& machine) {
+  return machine.target_given &&
+         std::ranges::equal(machine.target_offset_m, kExampleTarget_m,
+                            [](double own, double given) { return std::abs(own - given) < 1e-9; });
+}
+
+std::vector<std::string> left_of_the_example(const toml::table& table,
+                                             const MachineConfig& machine) {
+  if (machine.name != kExampleName) return {};
+  std::vector<std::string> left{fmt::format("machine.name \"{}\"", kExampleName)};
+  if (has_example_travel(machine)) left.emplace_back("the travel of X, Y and Z");
+  if (has_example_target(machine)) left.emplace_back("target.offset_mm");
+  for (const auto& [name, values] : table) {
+    const toml::table* section = values.as_table();
+    if (section != nullptr && (*section)["host"].value_or(std::string_view{}) == kExampleHost)
+      left.push_back(fmt::format("{}.host \"{}\"", name.str(), kExampleHost));
+  }
+  return left;
+}
+
 /// "file:line:column: key: what" for everything that is possible but improbable.
 std::vector<std::string> warnings_of(const toml::table& table, const Config& config, int cpus,
                                      const std::string& file) {
@@ -173,11 +210,13 @@ Result<CheckedConfig> check_config(const fs::path& file, int cpus) {
   Faults faults(file.string(), kMostConfigFaults);
   Section root(&*table, "", {1, 1}, faults);
 
-  CheckedConfig checked{.config = read_all(root, file.parent_path()), .warnings = {}};
+  CheckedConfig checked{
+      .config = read_all(root, file.parent_path()), .warnings = {}, .of_the_example = {}};
   check_paths(root, checked.config);
   if (faults.any()) return tl::make_unexpected(faults.to_error());
 
   checked.warnings = warnings_of(*table, checked.config, cpus, file.string());
+  checked.of_the_example = left_of_the_example(*table, checked.config.machine);
   return checked;
 }
 

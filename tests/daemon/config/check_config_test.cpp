@@ -74,6 +74,21 @@ TEST_F(CheckConfig, HasNoWarningForAnOrdinaryMachine) {
   EXPECT_THAT(warnings(kMachine + kDevices), IsEmpty());
 }
 
+TEST_F(CheckConfig, NamesWhatIsStillTheExample) {
+  for (const char* name : {"abbed.toml", "first_abbed.toml"}) {
+    const auto copied =
+        check_config(std::filesystem::path(ABBE_DAEMON_EXAMPLES) / name, 8).value().of_the_example;
+    EXPECT_THAT(copied, ElementsAre("machine.name \"mill 7\"", "the travel of X, Y and Z",
+                                    "target.offset_mm", "tracker.host \"192.168.0.1\""))
+        << name;
+  }
+  const auto edited = checked("[machine]\nname = \"mill 7\"\n" +
+                              kMachine.substr(kMachine.find("chain =")) + kDevices);
+  ASSERT_TRUE(edited);
+  EXPECT_THAT(edited->of_the_example, ElementsAre("machine.name \"mill 7\"", "target.offset_mm"));
+  EXPECT_THAT(checked(kMachine + kDevices).value().of_the_example, IsEmpty());
+}
+
 // Not a fault: the file may be checked on another computer.
 TEST_F(CheckConfig, WarnsOfACpuThatThisComputerDoesNotHave) {
   EXPECT_THAT(warnings(kMachine + kDevices + "[daemon]\nhub_cpu = 7\ntracker_cpu = 99\n"),

@@ -50,8 +50,8 @@ class DdsDecisions : public ShopFloor {
     }
     return last == true;
   }
-  /// The subscriber does not apply any more at `since` + kWithinValidity. It may have refused before
-  /// `since`: on a busy host a vector is sometimes too old, and then no further refusal is printed.
+  /// The subscriber does not apply any more at `since` + kWithinValidity. It may have refused
+  /// before `since`: on a busy host a vector is sometimes too old, and no further refusal follows.
   void expect_refusal(Process& subscriber, Clock::time_point since) {
     std::this_thread::sleep_until(since + kWithinValidity);
     std::optional<Line> refused;

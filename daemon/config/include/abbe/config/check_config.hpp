@@ -18,6 +18,9 @@ struct CheckedConfig {
   /// One for each value that is possible but probably wrong, "file:line:column: key: what": a value
   /// in another unit, a forgotten table, or the number of a CPU that this computer does not have.
   std::vector<std::string> warnings;
+  /// The values that are still those of the example file, "machine.name \"mill 7\"", if the machine
+  /// has the name of the example; else empty.
+  std::vector<std::string> of_the_example;
 };
 
 /// As load_config(). Further faults are the path of a folder that cannot be created, a missing DDS

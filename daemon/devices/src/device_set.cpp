@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "abbe/devices/device_kind.hpp"
+#include "abbe/devices/starvation.hpp"
 #include "abbe/result/try.hpp"
 
 namespace abbe::daemon {
@@ -29,7 +30,10 @@ struct DeviceSet::State {
     while (!started.empty()) started.pop_back();
   }
 
-  StreamHealth health_of(const drivers::DeviceThread& thread, HostTime now) {
+  std::map<std::string, Starvation> starved;  // by stream
+
+  StreamHealth health_of(const drivers::DeviceThread& thread, double nominal_rate_hz,
+                         HostTime now) {
     StreamHealth h{.status = thread.status()};
     h.latency = thread.latency().read();
     h.latency_p50_s = std::chrono::duration<double>(h.latency.quantile(0.50)).count();
@@ -43,6 +47,9 @@ struct DeviceSet::State {
 
     at = now;
     samples = h.status.samples;
+    const std::string missing =
+        starved[h.status.name].look(nominal_rate_hz, h.status.state == "streaming", now, samples);
+    if (h.status.condition.empty()) h.status.condition = missing;
     return h;
   }
 };
@@ -90,7 +97,7 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
   std::vector<StreamHealth> out;
   for (auto* const running : state_->devices) {
     for (const auto* const thread : running->threads())
-      out.push_back(state_->health_of(*thread, now));
+      out.push_back(state_->health_of(*thread, running->nominal_rate_hz(), now));
   }
 
   return out;

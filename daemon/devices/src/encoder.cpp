@@ -1,3 +1,4 @@
+#include "abbe/base/units.hpp"
 #include "abbe/devices/encoder_options.hpp"
 
 #include <string>
@@ -42,8 +43,8 @@ std::unique_ptr<drivers::CanBus> make_bus(const EncoderConfig& config, double sp
 
 class RunningEncoder final : public RunningDevices {
  public:
-  RunningEncoder(Running<drivers::EncoderDevice> running, std::size_t place)
-      : running_(std::move(running)), place_(place) {}
+  RunningEncoder(Running<drivers::EncoderDevice> running, std::size_t place, double rate_hz)
+      : running_(std::move(running)), place_(place), rate_hz_(rate_hz) {}
 
   void drain(Batch& batch) override {
     drain_ring(running_.device->samples(), axes_, batch.axes);
@@ -52,10 +53,12 @@ class RunningEncoder final : public RunningDevices {
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
     return {running_.thread.get()};
   }
+  [[nodiscard]] double nominal_rate_hz() const override { return rate_hz_; }
 
  private:
   Running<drivers::EncoderDevice> running_;
   std::size_t place_;
+  double rate_hz_;
   std::array<protocol::AxisSample, kMostSamples> axes_;
   BlockBuffer blocks_;
 };
@@ -64,13 +67,15 @@ Result<std::unique_ptr<RunningDevices>> start_encoder(const DeviceStart& start) 
   const Config& config = start.config;
   const auto& encoder = config.of<EncoderConfig>();
   if (!encoder) return nullptr;
+  auto options = device_options(*encoder, config.daemon.speed);
+  if (config.daemon.simulated) options.delay_advice = kBusyComputer;
   auto running = run(drivers::EncoderDevice::create(
-                         device_options(*encoder, config.daemon.speed),
-                         make_bus(*encoder, config.daemon.speed, start.time), start.time),
+                         options, make_bus(*encoder, config.daemon.speed, start.time), start.time),
                      thread_options(config.daemon, "abbe-encoder", config.daemon.encoder_priority,
                                     config.daemon.encoder_cpu));
   ABBE_TRY(running);
-  return std::make_unique<RunningEncoder>(std::move(*running), start.first);
+  return std::make_unique<RunningEncoder>(std::move(*running), start.first,
+                                          1.0 / in_seconds(encoder->sync_period));
 }
 
 class EncoderDecoder final : public RawDecoders {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,11 @@
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
+
+/// Instead of the service of a device that is simulated.
+inline constexpr std::string_view kBusyComputer =
+    "the device is simulated: this computer is too busy for it, give it less to do or a lower "
+    "speed";
 
 /// Largest numbers of elements that are popped from a ring at once; several bursts of a device fit.
 inline constexpr std::size_t kMostSamples = 1024;

@@ -40,8 +40,11 @@ protocol::emscon::Environment controller_units(const AssumedAir& air) {
 class RunningTracker final : public RunningDevices, private TrackerOrders {
  public:
   RunningTracker(Running<drivers::TrackerDevice> running, std::size_t place,
-                 std::chrono::nanoseconds longest_order)
-      : running_(std::move(running)), place_(place), longest_order_(longest_order) {}
+                 std::chrono::nanoseconds longest_order, double rate_hz)
+      : running_(std::move(running)),
+        place_(place),
+        longest_order_(longest_order),
+        rate_hz_(rate_hz) {}
 
   void drain(Batch& batch) override {
     drain_ring(running_.device->points(), points_, batch.points);
@@ -51,6 +54,7 @@ class RunningTracker final : public RunningDevices, private TrackerOrders {
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
     return {running_.thread.get()};
   }
+  [[nodiscard]] double nominal_rate_hz() const override { return rate_hz_; }
   [[nodiscard]] TrackerOrders* orders() noexcept override { return this; }
 
  private:
@@ -64,22 +68,30 @@ class RunningTracker final : public RunningDevices, private TrackerOrders {
   Running<drivers::TrackerDevice> running_;
   std::size_t place_;
   std::chrono::nanoseconds longest_order_;
+  double rate_hz_;
   std::array<protocol::TrackerPoint, kMostSamples> points_;
   std::array<protocol::EnvironmentSample, 16> weather_;
   BlockBuffer blocks_;
 };
 
+/// A tracker that gives mean values of a target at rest sends when the target rests.
+double nominal_rate_hz(const TrackerConfig& config) {
+  return config.mode == TrackerModeConfig::Continuous ? config.point_rate_hz : 0.0;
+}
+
 Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) {
   const Config& config = start.config;
   const auto& tracker = config.of<TrackerConfig>();
   if (!tracker) return nullptr;
-  const auto options = device_options(*tracker, config.daemon.speed);
+  auto options = device_options(*tracker, config.daemon.speed);
+  if (config.daemon.simulated) options.clock_advice = kBusyComputer;
   auto running = run(drivers::TrackerDevice::create(options, start.time),
                      thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
                                     config.daemon.tracker_cpu));
   ABBE_TRY(running);
   return std::make_unique<RunningTracker>(std::move(*running), start.first,
-                                          drivers::longest_order(options.session));
+                                          drivers::longest_order(options.session),
+                                          nominal_rate_hz(*tracker));
 }
 
 class TrackerDecoder final : public RawDecoders {

@@ -53,9 +53,7 @@ void EncoderDevice::account(HostTime now) {
 /// all three, so only the bundles are reported.
 void EncoderDevice::report_late_answers(HostTime now) {
   report_count(together_.count(), bundled_reported_,
-               "bundles of answers to several SYNCs: the tunnel delays frames (cannelloni: set -t, "
-               "in us, well below the SYNC period)",
-               now);
+               fmt::format("bundles of answers to several SYNCs: {}", options_.delay_advice), now);
   const auto& counters = receiver_.counters();
 
   if (bundled_reported_.at && now - *bundled_reported_.at < 2 * kRepeatReportAfter) {

@@ -93,9 +93,9 @@ void TrackerDevice::report_clock() {
   board_.fault(
       time_.now(),
       fmt::format("{}: the tracker's clock runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: its "
-                  "points are marked ClockUnsettled; have the tracker serviced",
+                  "points are marked ClockUnsettled; {}",
                   peer_.name, kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
-                  kPpm * options_.clock.max_skew));
+                  kPpm * options_.clock.max_skew, options_.clock_advice));
 }
 
 /// Reports points whose time did not fit, and jumps of the tracker's clock.

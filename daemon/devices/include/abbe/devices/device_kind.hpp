@@ -84,6 +84,9 @@ class RunningDevices {
   /// `ignore`), and for each assumption of the driver.
   [[nodiscard]] virtual std::vector<std::string> warnings() const;
 
+  /// Samples per second that each device sends while its state is "streaming"; 0: not known.
+  [[nodiscard]] virtual double nominal_rate_hz() const { return 0.0; }
+
   // Functions of some kinds only. null or nullopt: this kind of device does not have the function.
   [[nodiscard]] virtual MachineMotion* motion() noexcept { return nullptr; }
   [[nodiscard]] virtual TrackerOrders* orders() noexcept { return nullptr; }

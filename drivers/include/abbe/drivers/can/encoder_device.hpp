@@ -65,6 +65,9 @@ struct EncoderDeviceOptions {
   SyncSource sync = SyncSource::Thread;
   /// wait before the bus is opened again after a failure of the transport
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
+  /// Why answers to several SYNCs come at once, and what to do, for the fault.
+  std::string delay_advice =
+      "the tunnel delays frames (cannelloni: set -t, in us, well below the SYNC period)";
   std::size_t sample_capacity = 8192;  ///< 8 s at 1 kHz
   std::size_t raw_capacity_blocks = 8192;
 };

@@ -31,6 +31,8 @@ struct TrackerDeviceOptions {
   std::uint16_t port = emscon::kPort;
   TrackerSessionOptions session;  ///< `peer` is made from name, host and port
   ClockModelOptions clock;
+  /// What to do if the tracker's clock runs too fast or too slowly, for the fault.
+  std::string clock_advice = "have the tracker serviced";
   std::size_t point_capacity = 16384;  ///< 32 s at 500 points per second
   std::size_t environment_capacity = 256;
   std::size_t raw_capacity_blocks = 4096;

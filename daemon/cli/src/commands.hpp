@@ -38,6 +38,7 @@ void add_model_drift(CLI::App& parent, int& exit);
 void add_model_eval(CLI::App& parent, int& exit);
 void add_model_list(CLI::App& parent, int& exit);
 void add_model_show(CLI::App& parent, int& exit);
+void add_model_add(CLI::App& parent, int& exit);
 void add_model_activate(CLI::App& parent, int& exit);
 void add_model_rollback(CLI::App& parent, int& exit);
 void add_model_prune(CLI::App& parent, int& exit);

@@ -76,6 +76,7 @@ constexpr std::array kExamples{
     Example{"model drift", "active result/model.json"},
     Example{"model list", "--store /var/lib/abbe/models"},
     Example{"model show", "result/model.json"},
+    Example{"model add", "out/model.json -c /etc/abbe/abbed.toml"},
     Example{"model activate", "6ad1 --why \"verified with the step gauge\""},
     Example{"model rollback", "--why \"parts out of tolerance\""},
     Example{"model prune", "--keep-newest 1000 --keep-days 365"},

@@ -32,8 +32,10 @@ int print_session_verdict(const json& session, bool as_json) {
   if (as_json) {
     fmt::print("{}\n", indented_json_text(session));
   } else {
-    fmt::print("{} {}\n{}\n", state, session["model_id"].get<std::string>(),
-               session["reason"].get<std::string>());
+    const std::string model = session["model_id"];
+    fmt::print("calibration {}{}\n", state_in_words(session),
+               model.empty() ? "" : ", model " + model);
+    for (const std::string& sentence : sentences_of(session)) fmt::print("  {}\n", sentence);
   }
   return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
 }
@@ -85,7 +87,7 @@ std::string with_remaining_time(const std::string& state, const json& session) {
   return remaining.empty() ? state : fmt::format("{}, {}", state, remaining);
 }
 
-/// Prints one line whenever state or reason of the session change, for example "start: waiting
+/// Prints one line whenever state or reason of the session change, except for the verdict, for example "start: waiting
 /// for the machine to stand at ...", and one line per new note. Prints the tables whenever the run
 /// determines more of them than printed before. Once it determines all, also whenever the largest u
 /// in um or that in urad is less than half of that printed before.
@@ -102,7 +104,7 @@ class SessionLog {
     noted_ = noted;
   }
   void print_state(ProgressBar& bar, const std::string& state, const std::string& reason) {
-    std::string line = fmt::format("{}: {}", state, reason);
+    std::string line = reason.empty() ? state : fmt::format("{}: {}", state, reason);
     if (line == printed_) return;
     bar.clear();
     fmt::print(stderr, "{}\n", line);
@@ -158,7 +160,9 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
       bar.clear();
       return print_session_verdict(session, as_json);
     }
-    log.print_state(bar, state_in_words(session), session["reason"]);
+    log.print_state(
+        bar, state_in_words(session),
+        session.contains("verdict") ? std::string{} : session["reason"].get<std::string>());
     log.print_tables(bar, session);
     bar.show(with_remaining_time(state_in_words(session), session),
              session["progress"].get<double>());

@@ -1,4 +1,4 @@
-/// `abbe model list|show|activate|rollback|prune`: commands for the model store of a machine.
+/// `abbe model list|show|add|activate|rollback|prune`: commands for the model store of a machine.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/local_time.hpp"
 #include "abbe/base/printable.hpp"
@@ -207,6 +208,47 @@ int activate(const ModelStoreArguments& arguments) {
   return 0;
 }
 
+/// Refused for a model of another machine than that of the configuration; without -c unknown.
+Result<void> check_machine(const ModelStoreArguments& arguments, const ModelDocument& document) {
+  if (arguments.store.config.empty()) return {};
+  const auto config = load_config(arguments.store.config);
+  ABBE_TRY(config);
+  const auto unfit = unfit_for(document, present_configuration(*config), "");
+  if (unfit.empty()) return {};
+  return fail(ErrorCode::Refused, fmt::format("add {}: {}", arguments.id, unfit));
+}
+
+Result<ModelDocument> judged_model(const std::string& file) {
+  auto document = read_model(file);
+  ABBE_TRY(document);
+  if (!document->verdict)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: the gate has not judged this model: identify it again with this "
+                            "version, or with --keep STORE",
+                            file));
+  return document;
+}
+
+/// Adds a model.json with the verdict of the gate that it has. 5 if that is a refusal.
+int add(const ModelStoreArguments& arguments) {
+  const auto document = judged_model(arguments.id);
+  if (!document) return report(document.error());
+  if (const auto fits = check_machine(arguments, *document); !fits) return report(fits.error());
+  auto store = open_store(arguments.store);
+  if (!store) return report(store.error());
+  const bool accepted = document->verdict->accepted;
+  const auto id =
+      store->add(*document, accepted, document->verdict->reasons, actor_now(arguments.force.why));
+  if (!id) return report(id.error());
+
+  fmt::print("added: {}\nverdict: {}\n", *id, printable_line(in_one_line(document->verdict)));
+  for (const auto& input : document->inputs)
+    fmt::print("input: {}  sha256 {}\n", printable_line(input.name), input.sha256);
+  if (!accepted) return exit_code(ErrorCode::Refused);
+  fmt::print("next: abbe model activate {}\n", *id);
+  return 0;
+}
+
 int rollback(const ModelStoreArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
@@ -251,6 +293,20 @@ void add_model_show(CLI::App& parent, int& exit) {
   add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "print the whole model.json");
   command->callback([arguments, &exit] { exit = show(*arguments); });
+}
+
+void add_model_add(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ModelStoreArguments>();
+  auto* command = parent.add_subcommand("add",
+                                        "Add a model of files, recordings or `abbe identify joint` "
+                                        "to the store, with the verdict of\n"
+                                        "the gate and the hashes of its inputs. With -c only a "
+                                        "model of that machine. A refused model\n"
+                                        "is kept, too; then the exit code is 5");
+  command->add_option("FILE", arguments->id, "model.json, as abbe identify writes it")->required();
+  add_store_options(*command, arguments->store);
+  command->add_option("--why,--reason", arguments->force.why, "reason, for the record");
+  command->callback([arguments, &exit] { exit = add(*arguments); });
 }
 
 void add_model_activate(CLI::App& parent, int& exit) {

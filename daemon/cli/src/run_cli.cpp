@@ -87,6 +87,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_model_drift(*model, exit);
   add_model_list(*model, exit);
   add_model_show(*model, exit);
+  add_model_add(*model, exit);
   add_model_activate(*model, exit);
   add_model_rollback(*model, exit);
   add_model_prune(*model, exit);

@@ -17,7 +17,36 @@ std::string remaining_time(const nlohmann::json& session) {
 
 std::string state_in_words(const nlohmann::json& session) {
   const auto state = session.at("state").get<std::string>();
-  return state == "warming" ? "start" : state;
+  if (state == "idle") return "not running";
+  if (state == "warming") return "start";
+  if (state == "active") return "has ended: accepted";
+  return state == "refused" ? "has ended: refused" : state;
+}
+
+namespace {
+
+std::vector<std::string> sentences_of_verdict(const nlohmann::json& session) {
+  const auto verdict = session.find("verdict");
+  if (verdict == session.end()) {
+    const auto reason = session.value("reason", std::string{});
+    return reason.empty() ? std::vector<std::string>{} : std::vector{reason};
+  }
+  std::vector<std::string> lines;
+  for (const auto& reason : verdict->value("reasons", nlohmann::json::array()))
+    lines.push_back("reason: " + reason.get<std::string>());
+  lines.push_back(verdict->value("figures", std::string{}));
+  for (const auto& note : verdict->value("notes", nlohmann::json::array()))
+    lines.push_back("note: " + note.get<std::string>());
+  return lines;
+}
+
+}  // namespace
+
+std::vector<std::string> sentences_of(const nlohmann::json& session) {
+  auto lines = sentences_of_verdict(session);
+  if (const auto again = session.value("again", std::string{}); !again.empty())
+    lines.push_back("to identify this run again, with other options: " + again);
+  return lines;
 }
 
 }  // namespace abbe::daemon

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 namespace abbe::daemon {
 
@@ -10,7 +11,12 @@ namespace abbe::daemon {
 /// has no remaining time: it is not known yet, or the daemon is an older version.
 [[nodiscard]] std::string remaining_time(const nlohmann::json& session);
 
-/// The state for people: "start" for "warming", which the messages call the time before a run.
+/// The state for people: "start" for "warming", which the messages call the time before a run;
+/// "has ended: accepted".
 [[nodiscard]] std::string state_in_words(const nlohmann::json& session);
+
+/// What is to be said of the session, one sentence each: the verdict with reasons and notes, or why
+/// it is in this state, or what to do now; the command that identifies the run again. Older versions of abbed send only the latter.
+[[nodiscard]] std::vector<std::string> sentences_of(const nlohmann::json& session);
 
 }  // namespace abbe::daemon

@@ -227,9 +227,12 @@ void print_status(const json& status) {
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
   if (status.contains("machine_stop")) print_machine_stop(status["machine_stop"]);
   const json& session = status["session"];
-  fmt::print("session    {}, {:.0f} %, {} points: {}\n", state_in_words(session),
-             100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
-             session["reason"].get<std::string>());
+  fmt::print("session    {}", state_in_words(session));
+  if (session["points"].get<std::uint64_t>() > 0)
+    fmt::print(", {:.0f} %, {} points", 100.0 * session["progress"].get<double>(),
+               session["points"].get<std::uint64_t>());
+  fmt::print("\n");
+  for (const std::string& sentence : sentences_of(session)) fmt::print("           {}\n", sentence);
   if (const auto remaining = remaining_time(session); !remaining.empty())
     fmt::print("           {}\n", remaining);
   if (session.contains("start")) print_start(session["start"]);

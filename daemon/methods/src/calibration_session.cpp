@@ -218,9 +218,10 @@ void CalibrationSession::report_not_stored(std::string fault, std::string_view a
 }
 
 void CalibrationSession::judged(std::string model_id, bool passed, std::string reason,
-                                HostTime now) {
+                                SessionVerdict verdict, HostTime now) {
   if (!next_stage(stage_, SessionStep::ModelStored)) return;
   status_.model_id = std::move(model_id);
+  status_.verdict = std::move(verdict);
   enter(SessionStep::ModelStored, reason, now);
   status_.refused_as = ErrorCode::Refused;
   enter(passed ? SessionStep::VerdictPasses : SessionStep::VerdictFails, std::move(reason), now);

@@ -92,7 +92,7 @@ void add_items(HtmlReport& page, const VerdictInWords& verdict) {
     page.list(verdict.reasons);
   }
   if (!verdict.notes.empty()) {
-    page.paragraph("Notes, no reasons against the model:");
+    page.paragraph("To know about this model:");
     page.list(verdict.notes);
   }
 }

@@ -19,24 +19,33 @@ namespace {
 
 using protocol::HostTime;
 
-std::string verdict_text(const calib::Verdict& verdict) {
+/// `held`: the model is accepted, but not activated because of [drift] hold.
+SessionVerdict session_verdict(const std::string& id, const calib::Verdict& verdict, bool held) {
   const auto& h = verdict.held_out;
-  const std::string figures = fmt::format(
-      "held-out residual rms {:.3f} um, without compensation {:.3f} um{}", h.candidate_rms_m * 1e6,
-      h.no_compensation_rms_m * 1e6,
-      h.active_rms_m ? fmt::format(", active model {:.3f} um", *h.active_rms_m * 1e6) : "");
-  const std::string notes =
-      verdict.notes.empty() ? "" : fmt::format("; {}", fmt::join(verdict.notes, "; "));
-  if (verdict.accepted) return "accepted: " + figures + notes;
-  return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), figures, notes);
+  SessionVerdict out{
+      .figures = fmt::format(
+          "held-out residual rms {:.3f} um, without compensation {:.3f} um{}",
+          h.candidate_rms_m * 1e6, h.no_compensation_rms_m * 1e6,
+          h.active_rms_m ? fmt::format(", active model {:.3f} um", *h.active_rms_m * 1e6) : ""),
+      .reasons = verdict.accepted ? std::vector<std::string>{} : verdict.reasons,
+      .notes = verdict.notes};
+  if (held)
+    out.reasons.push_back(
+        fmt::format("not activated, because the machine has changed since the active model "
+                    "([drift] hold): check the machine, then `abbe model activate {}`",
+                    id));
+  return out;
 }
 
-/// Before the verdict on a model that is not activated because of [drift] hold.
-std::string held_text(const std::string& id) {
-  return fmt::format(
-      "not activated, because the machine has changed since the active model ([drift] hold): check "
-      "the machine, then `abbe model activate {}`; ",
-      id);
+/// The same in one line, for events.
+std::string text_of(const SessionVerdict& verdict, bool accepted) {
+  const std::string notes =
+      verdict.notes.empty() ? "" : fmt::format("; {}", fmt::join(verdict.notes, "; "));
+  if (accepted)
+    return fmt::format("{}{}accepted: {}{}", fmt::join(verdict.reasons, "; "),
+                       verdict.reasons.empty() ? "" : "; ", verdict.figures, notes);
+  return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), verdict.figures,
+                     notes);
 }
 
 // Period of further attempts to store a model. It may be long, because a full disk or a lock
@@ -239,7 +248,20 @@ void CalibrationService::discard_model() {
   destroy_in_background(std::exchange(model_, nullptr));
 }
 
+/// The command that identifies the run of the session again.
+std::string CalibrationService::identify_again() const {
+  if (recorder_ == nullptr || recorder_->status().file.empty()) return {};
+  std::error_code failed;
+  const auto full = [&failed](const std::filesystem::path& path) {
+    return std::filesystem::absolute(path, failed).string();
+  };
+  return fmt::format("abbe identify {} --recording {} --keep {} -o again", session_.status().method,
+                     full(recorder_->status().file), full(config_.daemon.models_dir()));
+}
+
 void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
+  again_ = identify_again();
+  again_of_ = session_.status().id;
   if (!kept && !model_) {
     session_.not_identified(kept.error(), now);
     return;
@@ -255,8 +277,10 @@ void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
   if (kept->active) authority_.set_active(std::move(*kept->active), revision_before_storing_);
   const calib::Verdict& verdict = model_->verdict;
   const bool held = verdict.accepted && model_->beside.hold;
-  session_.judged(kept->id, verdict.accepted && !held,
-                  (held ? held_text(kept->id) : std::string{}) + verdict_text(verdict), now);
+  SessionVerdict sentences = session_verdict(kept->id, verdict, held);
+  std::string reason = text_of(sentences, verdict.accepted);
+  session_.judged(kept->id, verdict.accepted && !held, std::move(reason), std::move(sentences),
+                  now);
   discard_model();
 }
 
@@ -264,6 +288,7 @@ SessionStatus CalibrationService::status() const {
   SessionStatus s = session_.status();
   if (s.state == SessionState::Identifying) s.progress = link_->share;
   if (session_.running()) s.live = live_tables_.latest();
+  if (s.state == SessionState::Refused && s.id == again_of_) s.again = again_;
   return s;
 }
 

@@ -121,7 +121,9 @@ json start_json(const StartState& start) {
   return {{"ready", start.ready}, {"missed", start.missed}, {"conditions", std::move(conditions)}};
 }
 
-json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
+/// `speed`: of the time of simulated devices; 1 with real ones.
+json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out,
+                  double speed) {
   json out{{"id", s.id},
            {"state", name(s.state)},
            {"method", s.method},
@@ -133,10 +135,15 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
            {"noted", s.noted}};
   if (s.state == SessionState::Refused) out["code"] = code_name(s.refused_as);
   if (s.next) out["next"] = next_json(*s.next);
-  if (s.remaining) out["remaining_s"] = in_seconds(*s.remaining);
+  if (s.remaining) out["remaining_s"] = in_seconds(*s.remaining) / speed;
   if (s.start) out["start"] = start_json(*s.start);
   if (s.live) out["live"] = live_json(*s.live);
 
+  if (!s.again.empty()) out["again"] = s.again;
+  if (s.verdict)
+    out["verdict"] = {{"figures", s.verdict->figures},
+                      {"reasons", s.verdict->reasons},
+                      {"notes", s.verdict->notes}};
   if (held_out) {
     out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
                               {"no_compensation", held_out->no_compensation_rms_m * 1e6}};
@@ -391,10 +398,11 @@ json status_json(const SeenStatus& seen, const Config& config) {
            {"machine", config.machine.name},
            {"simulated", config.daemon.simulated},
            {"model", model_json(seen.model)},
-           {"session", session_json(seen.session, seen.held_out)},
+           {"session", session_json(seen.session, seen.held_out, config.daemon.speed)},
            {"streams", std::move(devices)}};
   json& ended = out["ended_sessions"] = json::array();
-  for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
+  for (const auto& session : seen.ended)
+    ended.push_back(session_json(session, {}, config.daemon.speed));
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
   out["axes"] = axes_json(config, seen.live.axis_count, missing_reasons(seen));
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);

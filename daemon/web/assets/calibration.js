@@ -21,9 +21,19 @@ function nextTouch(next) {
     features.length ? `; ${touched} of ${features.length} balls and blocks of this position are complete` : "")];
 }
 
+/** The verdict of the gate, a line for each sentence. */
+function verdictParts({ figures, reasons, notes }) {
+  return [
+    ...(reasons.length ? [h("h2", {}, "Reasons against the model"), list(reasons)] : []),
+    h("p", {}, figures),
+    ...(notes.length ? [h("h2", {}, "To know about this model"), list(notes)] : []),
+  ];
+}
+
 /** What a run along a path needs before the machine may drive off. */
 function startParts(session) {
-  const { start } = session;
+  const { start, verdict } = session;
+  if (verdict) return verdictParts(verdict);
   if (!start) return [h("p", {}, session.reason)];
   return [
     start.ready ? h("p", { class: "large good", role: "status" }, session.reason) : null,
@@ -53,11 +63,14 @@ function liveTables(live) {
 function sessionParts(session) {
   const minutes = session.remaining_s === undefined ? "" : `, about ${fixed(session.remaining_s / 60, 1)} min left`;
   const held = session.held_out_rms_um;
+  const again = session.again ? [h("p", {}, "To identify this run again, with other options: ",
+    h("code", { id: "again" }, session.again))] : [];
   return [
     h("p", {}, h("strong", {}, stateInWords(session)), ` (${methodInWords(session)}), ${session.points} points${minutes}`),
     running(session) ? h("progress", { max: 1, value: session.progress, "aria-label": "progress" }) : null,
     ...startParts(session),
-    held ? h("p", {}, `Held-out residuals: ${fixed(held.candidate, 3)} um with the model, ` +
+    ...again,
+    held && !session.verdict ? h("p", {}, `Held-out residuals: ${fixed(held.candidate, 3)} um with the model, ` +
       `${fixed(held.no_compensation, 3)} um without.`) : null,
     ...nextTouch(session.next),
     ...(session.notes.length ? [h("h2", {}, "Noticed"), list(session.notes)] : []),

@@ -2,6 +2,7 @@
 
 import { facts, fixed, h, table } from "./dom.js";
 import { listen, state } from "./server.js";
+import { stateInWords } from "./session_words.js";
 
 const kDegrees = 180 / Math.PI;
 
@@ -59,7 +60,7 @@ function state_of(status) {
   const dds = status.dds;
   return facts("state", [
     ["model", `${status.model.id ?? "-"}: ${status.model.reason}`],
-    ["session", `${status.session.state}: ${status.session.reason}`],
+    ["session", stateInWords(status.session)],
     ["recording", recording(status)],
     ["DDS", dds ? `${dds.connected ? "connected" : "not connected"}, ${dds.sent} messages` : ""],
     ["release", status.release_awaited?.reason],

@@ -39,7 +39,7 @@ function verdict({ lamp, text, reasons, notes }) {
   return h("section", { id: "verdict", "data-lamp": lamp }, h("h2", {}, "Verdict"),
     h("div", { class: "signal" }, lamps, h("strong", {}, text)),
     h("div", { class: "columns" }, under("Reasons against it", reasons),
-      under("Notes, no reasons against the model", notes)));
+      under("To know about this model", notes)));
 }
 
 /** Shows the present verdict of the model: a later run may have found drift, or it was activated. */

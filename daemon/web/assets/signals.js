@@ -39,6 +39,7 @@ function signal(text, isWrong) {
 
 /** What a status asks of the person beside the machine: [text, is it wrong]; null: nothing. */
 function demand({ session }) {
+  if (session.state === "refused" && session.reason.startsWith("cancelled")) return null;
   if (session.state === "refused") return [`Calibration refused: ${session.reason}`, true];
   if (session.start?.missed) return [session.reason, true];
   if (session.start?.ready) return ["READY: drive the path now", false];

@@ -146,6 +146,40 @@ class CliRefusedModel : public CliModelStore {
   std::string id_;
 };
 
+TEST_F(CliRefusedModel, AddedIsKeptWithItsVerdictButNotActivated) {
+  const auto accepted = abbe("model add accepted.json --store store --why 'measured in May'");
+  EXPECT_EQ(accepted.exit, 0) << accepted.err;
+  const auto document = read_model(folder_ / "accepted.json").value();
+  EXPECT_THAT(accepted.out, AllOf(HasSubstr("added: " + model_id(document)),
+                                  HasSubstr("next: abbe model activate " + model_id(document))));
+  EXPECT_EQ(to_json(store().load(model_id(document)).value()), to_json(document));
+  EXPECT_EQ(store().history().value().back().actor.why, "measured in May");
+  EXPECT_EQ(store().active_id().value(), std::nullopt);
+
+  auto other = test::synthetic_document(3);
+  other.verdict = ModelVerdict{.reasons = {kReason}};
+  (void)write("other.json", to_json(other));
+  const auto refused = abbe("model add other.json --store store");
+  EXPECT_EQ(refused.exit, 5);
+  EXPECT_THAT(refused.out, AllOf(HasSubstr("added: "), HasSubstr(kReason)));
+  EXPECT_EQ(store().list().value().size(), 3U);
+}
+
+TEST_F(CliRefusedModel, WithoutVerdictOrOfAnotherMachineIsNotAdded) {
+  const auto unjudged = abbe("model add earlier.json --store store");
+  EXPECT_EQ(unjudged.exit, 3);
+  EXPECT_THAT(unjudged.err, HasSubstr("earlier.json: the gate has not judged this model"));
+
+  auto machine = test::synthetic_machine_toml();
+  machine.replace(machine.find("-120"), 4, "-121");
+  (void)write("other.toml", machine + "[daemon]\ndata_dir = \"data\"\n");
+  ASSERT_TRUE(ModelStore::open(folder_ / "data" / "models"));
+  const auto other = abbe("model add accepted.json -c other.toml");
+  EXPECT_EQ(other.exit, 5) << other.out;
+  EXPECT_THAT(other.err, HasSubstr("add accepted.json: "));
+  EXPECT_TRUE(ModelStore::open(folder_ / "data" / "models").value().list().value().empty());
+}
+
 TEST_F(CliRefusedModel, EvaluatedStatesItInTheOutputAndOnTheTerminal) {
   for (const std::string& model : {std::string{"refused.json"}, id_ + " --store store"}) {
     const auto ran = abbe("model eval " + model + " --points points.csv --correction");

@@ -66,7 +66,7 @@ TEST_F(CliOfADaemon, CalibratePrintsWhatEveryStepWaitsFor) {
   EXPECT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.err, AllOf(HasSubstr("start: waiting for the machine to stand at (1.000"),
                              HasSubstr("acquiring: driving the path")));
-  EXPECT_THAT(ran.out, StartsWith("active abcd"));
+  EXPECT_THAT(ran.out, StartsWith("calibration has ended: accepted, model abcd\n  accepted\n"));
 }
 
 nlohmann::json acquiring_with(const std::vector<nlohmann::json>& tables) {
@@ -246,6 +246,38 @@ TEST_F(CliOfADaemon, StatusShowsWhyAnAxisHasNoPositionAndHowFarTheRecordingIsBeh
   EXPECT_THAT(ran.out,
               HasSubstr("Y: scale_y is not available (Y is missing): rtd sends no value\n"));
   EXPECT_THAT(ran.out, HasSubstr("recording  run.mcap.part, 31.0 s behind\n"));
+}
+
+TEST_F(CliOfADaemon, AVerdictIsShownInOneLinePerSentence) {
+  const nlohmann::json verdict{{"figures", "held-out residual rms 0.200 um"},
+                               {"reasons", {"the steepest change is 9 um/m", "the noise is 4 um"}},
+                               {"notes", {"1 K of steel would be 3 um rms"}}};
+  const std::string sentences =
+      "reason: the steepest change is 9 um/m\n{0}reason: the noise is 4 um\n"
+      "{0}held-out residual rms 0.200 um\n{0}note: 1 K of steel would be 3 um rms\n";
+  auto ended = session("refused", "refused: all in one line");
+  ended["verdict"] = verdict;
+  const auto socket = folder_.path() / "verdict.sock";
+  const auto daemon = ControlServer::open(socket, ScriptedDaemon{{ended}});
+  ASSERT_TRUE(daemon);
+  const auto followed = calibrate(socket);
+  EXPECT_NE(followed.exit, 0);
+  EXPECT_THAT(followed.out, StartsWith("calibration has ended: refused\n  " +
+                                       fmt::format(fmt::runtime(sentences), "  ")));
+
+  auto status = status_with_positions();
+  ended["points"] = 12;
+  ended["notes"] = nlohmann::json::array();
+  status["session"] = ended;
+  const auto second = folder_.path() / "status.sock";
+  const auto answering = ControlServer::open(
+      second, [&status](const nlohmann::json&, const ControlPeer&) { return status; });
+  ASSERT_TRUE(answering);
+  const auto ran =
+      test::run_abbe(folder_.path(), fmt::format("status --socket '{}'", second.string()));
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("session    has ended: refused, 50 %, 12 points\n           " +
+                                 fmt::format(fmt::runtime(sentences), "           ")));
 }
 
 TEST_F(CliOfADaemon, StatusShowsTheRemainingTimeInSecondsOrMinutes) {

@@ -468,7 +468,7 @@ TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
     drive.stand(kPath.back(), 2s);
     ASSERT_TRUE(session.take_run());
     session.identified({}, drive.now());
-    session.judged("model", passed, "verdict", drive.now());
+    session.judged("model", passed, "verdict", {}, drive.now());
     std::vector<SessionState> track;
     for (const auto& event : session.take_events()) track.push_back(event.status.state);
     // READY is an event of its own.

@@ -112,7 +112,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// After store_failed(): the caller stores the model again.
   void store_again(protocol::HostTime now) { (void)go(SessionStep::StoreAgain, now); }
   /// The model is stored with its verdict.
-  void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
+  void judged(std::string model_id, bool passed, std::string reason, SessionVerdict verdict,
+              protocol::HostTime now);
 
   [[nodiscard]] SessionStage stage() const noexcept { return stage_; }
   /// Host time at which the stage began.

@@ -87,6 +87,13 @@ struct StartState {
   std::vector<StartCondition> conditions;
 };
 
+/// The verdict of the gate on the model of a session, in sentences.
+struct SessionVerdict {
+  std::string figures;               ///< the held-out residuals
+  std::vector<std::string> reasons;  ///< why the model is refused or not activated; empty: accepted
+  std::vector<std::string> notes;    ///< what does not speak against the model but must be known
+};
+
 struct SessionStatus {
   std::uint64_t id = 0;  ///< number of the session in this process, from 1; 0: none yet
   SessionState state = SessionState::Idle;
@@ -102,6 +109,10 @@ struct SessionStatus {
   /// Tables of the run so far; null: there are none yet. Shared with replies that other threads
   /// write; never changed.
   std::shared_ptr<const LiveTables> live{};
+  std::optional<SessionVerdict> verdict{};  ///< in states Active and Refused, if there is a model
+  /// in state Refused: the command that identifies the recorded run again, with other options;
+  /// empty: nothing was identified, or it is not recorded
+  std::string again{};
   std::string model_id;                ///< the model of this session, active or refused
   std::optional<RequestedTouch> next;  ///< touch requested by a guided acquisition
   std::vector<std::string> notes;      ///< remarks on touches, the latest kMostNotes

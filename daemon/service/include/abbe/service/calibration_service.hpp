@@ -94,6 +94,7 @@ class CalibrationService {
   void begin_identification(Acquisition acquired, protocol::HostTime now);
   void follow_background(protocol::HostTime now);
   bool take_model(protocol::HostTime now);
+  [[nodiscard]] std::string identify_again() const;
   void conclude(Result<KeptModel> kept, protocol::HostTime now);
   void store_in_background(ModelKeeper keeper, protocol::HostTime now);
   void discard_model();
@@ -112,6 +113,8 @@ class CalibrationService {
   std::shared_ptr<IdentificationLink> link_;   // with the last identification
   std::shared_ptr<JudgedModel> model_;         // to be stored; shared with the storing thread
   std::uint64_t revision_before_storing_ = 0;  // of the authority
+  std::string again_;                          // identifies the last identified run again
+  std::uint64_t again_of_ = 0;                 // the session of that run
 };
 
 }  // namespace abbe::daemon

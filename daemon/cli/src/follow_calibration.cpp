@@ -87,10 +87,10 @@ std::string with_remaining_time(const std::string& state, const json& session) {
   return remaining.empty() ? state : fmt::format("{}, {}", state, remaining);
 }
 
-/// Prints one line whenever state or reason of the session change, except for the verdict, for example "start: waiting
-/// for the machine to stand at ...", and one line per new note. Prints the tables whenever the run
-/// determines more of them than printed before. Once it determines all, also whenever the largest u
-/// in um or that in urad is less than half of that printed before.
+/// Prints one line whenever state or reason of the session change, except for the verdict, for
+/// example "start: waiting for the machine to stand at ...", and one line per new note. Prints the
+/// tables whenever the run determines more of them than printed before. Once it determines all,
+/// also whenever the largest u in um or that in urad is less than half of that printed before.
 class SessionLog {
  public:
   void print_notes(ProgressBar& bar, const json& session) {

@@ -16,7 +16,8 @@ namespace abbe::daemon {
 [[nodiscard]] std::string state_in_words(const nlohmann::json& session);
 
 /// What is to be said of the session, one sentence each: the verdict with reasons and notes, or why
-/// it is in this state, or what to do now; the command that identifies the run again. Older versions of abbed send only the latter.
+/// it is in this state, or what to do now; the command that identifies the run again. Older
+/// versions of abbed send no verdict.
 [[nodiscard]] std::vector<std::string> sentences_of(const nlohmann::json& session);
 
 }  // namespace abbe::daemon

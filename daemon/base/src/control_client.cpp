@@ -48,12 +48,22 @@ std::string group_name(gid_t gid) {
   return fmt::format("{}", gid);
 }
 
+/// Of this process.
+bool in_group(gid_t gid) {
+  std::array<gid_t, 1024> groups{};
+  const int count = ::getgroups(static_cast<int>(groups.size()), groups.data());
+  return ::getegid() == gid || std::find(groups.begin(), groups.begin() + std::max(count, 0),
+                                         gid) != groups.begin() + std::max(count, 0);
+}
+
 /// What to do if the socket cannot be connected.
 std::string advice(const std::filesystem::path& socket) {
   struct stat seen {};
   if (::access(socket.c_str(), R_OK | W_OK) == 0 || errno != EACCES ||
       (::stat(socket.c_str(), &seen) != 0 && ::stat(socket.parent_path().c_str(), &seen) != 0))
     return "is abbed running?";
+  if (seen.st_gid == 0 || (seen.st_mode & S_IRWXG) == 0 || in_group(seen.st_gid))
+    return "this user may not open it; use sudo, or the user that runs abbed";
   return fmt::format(
       "this user is not in the group {0}: run `sudo usermod -aG {0} $USER` and log in again, or "
       "use sudo",

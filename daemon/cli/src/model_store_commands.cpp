@@ -7,7 +7,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/local_time.hpp"
 #include "abbe/base/printable.hpp"
@@ -229,7 +228,7 @@ Result<ModelDocument> judged_model(const std::string& file) {
   return document;
 }
 
-/// Adds a model.json with the verdict of the gate that it has. 5 if that is a refusal.
+/// Adds a model.json with the verdict of the gate that it has, also if that is a refusal.
 int add(const ModelStoreArguments& arguments) {
   const auto document = judged_model(arguments.id);
   if (!document) return report(document.error());
@@ -244,8 +243,7 @@ int add(const ModelStoreArguments& arguments) {
   fmt::print("added: {}\nverdict: {}\n", *id, printable_line(in_one_line(document->verdict)));
   for (const auto& input : document->inputs)
     fmt::print("input: {}  sha256 {}\n", printable_line(input.name), input.sha256);
-  if (!accepted) return exit_code(ErrorCode::Refused);
-  fmt::print("next: abbe model activate {}\n", *id);
+  if (accepted) fmt::print("next: abbe model activate {}\n", *id);
   return 0;
 }
 
@@ -297,12 +295,12 @@ void add_model_show(CLI::App& parent, int& exit) {
 
 void add_model_add(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
-  auto* command = parent.add_subcommand("add",
-                                        "Add a model of files, recordings or `abbe identify joint` "
-                                        "to the store, with the verdict of\n"
-                                        "the gate and the hashes of its inputs. With -c only a "
-                                        "model of that machine. A refused model\n"
-                                        "is kept, too; then the exit code is 5");
+  auto* command = parent.add_subcommand(
+      "add",
+      "Add a model of files, recordings or `abbe identify joint` to the store, with the verdict "
+      "of\n"
+      "the gate and the hashes of its inputs. With -c only a model of that machine. A model that\n"
+      "the gate refused is added as refused");
   command->add_option("FILE", arguments->id, "model.json, as abbe identify writes it")->required();
   add_store_options(*command, arguments->store);
   command->add_option("--why,--reason", arguments->force.why, "reason, for the record");

@@ -138,8 +138,10 @@ void print_one(const Verification& v) {
   const calib::Vector3 tool_mm = kMmPerM * v.models.front().tool_m;
   fmt::print("points      {}; {} of these places where the model is valid\n",
              shots_text(v.observations), v.inside);
-  fmt::print("tool        they count as points of the tool offset ({:g} {:g} {:g}) mm; --tool-mm\n",
-             tool_mm.x(), tool_mm.y(), tool_mm.z());
+  fmt::print(
+      "tool        the points are taken as those of the tool offset ({:g} {:g} {:g}) mm "
+      "(--tool-mm)\n",
+      tool_mm.x(), tool_mm.y(), tool_mm.z());
   fmt::print(
       "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with "
       "the model\n",
@@ -203,7 +205,7 @@ void print(const Verification& v, const VerifyCommand& arguments) {
 Result<void> check_pdf(const VerifyCommand& arguments) {
   if (arguments.pdf.empty()) return {};
   if (arguments.models.size() > 1) return fail(ErrorCode::Usage, "--pdf is for one model");
-  return require_place_of(arguments.pdf);
+  return daemon::check_pdf(std::filesystem::path(arguments.pdf));
 }
 
 int run(const VerifyCommand& arguments) {

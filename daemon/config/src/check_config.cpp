@@ -174,8 +174,9 @@ bool has_example_target(const MachineConfig& machine) {
 
 std::vector<std::string> left_of_the_example(const toml::table& table,
                                              const MachineConfig& machine) {
-  if (machine.name != kExampleName) return {};
-  std::vector<std::string> left{fmt::format("machine.name \"{}\"", kExampleName)};
+  std::vector<std::string> left;
+  if (machine.name == kExampleName)
+    left.push_back(fmt::format("machine.name \"{}\"", kExampleName));
   if (has_example_travel(machine)) left.emplace_back("the travel of X, Y and Z");
   if (has_example_target(machine)) left.emplace_back("target.offset_mm");
   for (const auto& [name, values] : table) {
@@ -183,7 +184,10 @@ std::vector<std::string> left_of_the_example(const toml::table& table,
     if (section != nullptr && (*section)["host"].value_or(std::string_view{}) == kExampleHost)
       left.push_back(fmt::format("{}.host \"{}\"", name.str(), kExampleHost));
   }
-  return left;
+  // A single one may be true: some machines have this travel, and trackers leave the factory with
+  // this address.
+  constexpr std::size_t kFewest = 2;
+  return left.size() >= kFewest ? left : std::vector<std::string>{};
 }
 
 /// "file:line:column: key: what" for everything that is possible but improbable.

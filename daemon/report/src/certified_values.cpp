@@ -39,12 +39,16 @@ std::string decimal_text(double number, int decimals) {
   return is_zero && text.front() == '-' ? text.substr(1) : text;
 }
 
-CertifiedValue not_estimable(std::string key, std::string name, std::string_view why) {
-  return {.key = std::move(key), .name = std::move(name), .why = std::string(why)};
+CertifiedValue not_estimable(std::string key, std::string name, std::string_view why,
+                             bool is_angle) {
+  return {.key = std::move(key),
+          .name = std::move(name),
+          .is_angle = is_angle,
+          .why = std::string(why)};
 }
 
 CertifiedValue certified(std::string key, std::string name, const Value& value, bool is_angle) {
-  if (!value.in_model) return not_estimable(std::move(key), std::move(name), kNotInModel);
+  if (!value.in_model) return not_estimable(std::move(key), std::move(name), kNotInModel, is_angle);
   const double scale = is_angle ? kUradPerRad : kUmPerM;
   const double U = 2.0 * scale * value.u;
   const int decimals = decimals_of(U);
@@ -69,7 +73,7 @@ CertifiedValue without_u(std::string key, std::string name, double length_m, dou
 CertifiedValue of_both_directions(std::string key, std::string name,
                                   const std::optional<Value>& value, std::string_view why) {
   if (value) return certified(std::move(key), std::move(name), *value, false);
-  return not_estimable(std::move(key), std::move(name), why);
+  return not_estimable(std::move(key), std::move(name), why, false);
 }
 
 ValueGroup volume_group(const calib::iso::VolumeError& e) {

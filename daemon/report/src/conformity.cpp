@@ -37,6 +37,23 @@ std::string keys_that_can_be_judged(const CertifiedValues& values) {
   return keys;
 }
 
+/// "EYX", "EC0Y": an error of ISO 230-1. Its unit follows from its second letter.
+bool is_error_name(std::string_view key) {
+  const auto any_of = [key](std::size_t i, std::string_view letters) {
+    return letters.find(key[i]) != std::string_view::npos;
+  };
+  if (key.size() == 3) return key[0] == 'E' && any_of(1, "XYZABC") && any_of(2, "XYZ");
+  return key.size() == 4 && key[0] == 'E' && any_of(1, "ABC") && key[2] == '0' && any_of(3, "XYZ");
+}
+
+/// An error that the model does not have: with one tool offset not all can be distinguished.
+CertifiedValue not_in_model(const std::string& key) {
+  return {.key = key,
+          .name = key,
+          .is_angle = std::string_view("ABC").find(key[1]) != std::string_view::npos,
+          .why = "the measurement does not distinguish it from the other errors"};
+}
+
 /// Why the limit cannot be judged.
 std::optional<std::string> fault_of(const CertifiedValue* value, const ToleranceDetails& limit) {
   if (value == nullptr) return "the model has no such value";
@@ -76,7 +93,10 @@ Result<std::vector<JudgedValue>> judge(const CertifiedValues& values,
   std::vector<JudgedValue> all;
   std::vector<std::string> faults;
   for (const ToleranceDetails& limit : limits) {
-    const CertifiedValue* const value = find(values, limit.value);
+    const CertifiedValue* value = find(values, limit.value);
+    std::optional<CertifiedValue> missing;
+    if (value == nullptr && is_error_name(limit.value))
+      value = &missing.emplace(not_in_model(limit.value));
     if (const auto fault = fault_of(value, limit))
       faults.push_back(fmt::format("[[tolerance]] value = \"{}\": {}", limit.value, *fault));
     else

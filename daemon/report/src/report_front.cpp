@@ -33,7 +33,8 @@ std::string date_of(const ReportSubject& subject) {
   const CertificateDetails& d = subject.details;
   if (const auto measured = measured_of(subject.document))
     return local_time_text((*measured)[0]) + " to " + local_time_text((*measured)[1]);
-  if (!d.begin_date.empty() || !d.end_date.empty()) return d.begin_date + " to " + d.end_date;
+  if (d.begin_date.empty() != d.end_date.empty()) return d.begin_date + d.end_date;
+  if (!d.begin_date.empty()) return d.begin_date + " to " + d.end_date;
   return "not known (certificate.begin_date, certificate.end_date)";
 }
 
@@ -114,7 +115,7 @@ std::string_view in_words(Conformity conformity) {
     case Conformity::Fail:
       return "Fail: a value is beyond its limit.";
     case Conformity::Neither:
-      return "Neither pass nor fail: a limit is within the uncertainty of its value.";
+      return "Neither pass nor fail: for at least one limit conformity is not proven.";
   }
   return {};
 }

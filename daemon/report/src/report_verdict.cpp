@@ -73,14 +73,15 @@ bool has_drifted(const ReportSubject& subject) {
   return !subject.events.empty() && subject.events.back().action == StoreAction::Drifted;
 }
 
-/// Those that together have at most so many characters. Each takes at least the width of the page.
+/// Those that together have at most so many characters, and at least one. Each takes at least the
+/// width of the page.
 std::vector<std::string> first_of(const std::vector<std::string>& items, std::size_t most) {
   constexpr std::size_t kLine = 100;
   std::vector<std::string> first;
   std::size_t used = 0;
   for (const std::string& item : items) {
     used += std::max(item.size(), kLine);
-    if (used > most) break;
+    if (used > most && !first.empty()) break;
     first.push_back(item);
   }
   return first;

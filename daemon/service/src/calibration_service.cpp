@@ -248,15 +248,13 @@ void CalibrationService::discard_model() {
   destroy_in_background(std::exchange(model_, nullptr));
 }
 
-/// The command that identifies the run of the session again.
+/// The command that identifies the run of the session again. The file loses the end ".part" when it
+/// is closed; abbe identify finds it by both names.
 std::string CalibrationService::identify_again() const {
   if (recorder_ == nullptr || recorder_->status().file.empty()) return {};
   std::error_code failed;
-  const auto full = [&failed](const std::filesystem::path& path) {
-    return std::filesystem::absolute(path, failed).string();
-  };
-  return fmt::format("abbe identify {} --recording {} --keep {} -o again", session_.status().method,
-                     full(recorder_->status().file), full(config_.daemon.models_dir()));
+  const auto file = std::filesystem::absolute(recorder_->status().file, failed).string();
+  return fmt::format("abbe identify {} --recording '{}' -o again", session_.status().method, file);
 }
 
 void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {

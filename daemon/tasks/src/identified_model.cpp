@@ -75,7 +75,7 @@ ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdic
 Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& identified,
                             const calib::Verdict& verdict, const ResultFiles& more,
                             const Progress& progress) {
-  if (!place.pdf.empty()) ABBE_TRY(require_place_of(place.pdf));
+  if (!place.pdf.empty()) ABBE_TRY(check_pdf(place.pdf));
   ModelDocument document = identified;
   document.verdict = model_verdict(verdict);
   const std::filesystem::path folder = place.out;

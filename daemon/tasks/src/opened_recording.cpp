@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
+#include <string_view>
 #include <utility>
 
 #include "abbe/base/input_file.hpp"
@@ -10,7 +12,22 @@
 
 namespace abbe::daemon {
 
-Result<OpenedRecording> open_recording(const std::string& file, const std::string& config) {
+namespace {
+
+/// A recording that is being written ends in ".part", which it loses when it is closed.
+std::string present_name(const std::string& file) {
+  constexpr std::string_view kOpen = ".part";
+  std::error_code unknown;
+  if (std::filesystem::exists(file, unknown)) return file;
+  const std::string other = file.ends_with(kOpen) ? file.substr(0, file.size() - kOpen.size())
+                                                  : file + std::string(kOpen);
+  return std::filesystem::exists(other, unknown) ? other : file;
+}
+
+}  // namespace
+
+Result<OpenedRecording> open_recording(const std::string& named, const std::string& config) {
+  const std::string file = present_name(named);
   auto reader = RecordingReader::open(file);
   ABBE_TRY(reader);
   const auto recorded = recorded_config(*reader, file);

@@ -21,6 +21,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/result/try.hpp"
+#include "abbe/tasks/output_files.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -80,6 +81,12 @@ std::vector<std::string> converter(const fs::path& html, const fs::path& pdf,
   return {};
 }
 
+Result<void> no_converter() {
+  return fail(ErrorCode::Io,
+              "--pdf: no converter is installed; install weasyprint or chromium, or print the HTML "
+              "report from a browser");
+}
+
 /// Starts the program without output. nullopt if it cannot be started.
 std::optional<pid_t> start_converter(const std::vector<std::string>& words) {
   std::vector<std::string> copy = words;
@@ -127,16 +134,18 @@ bool succeeds(pid_t child, const Progress& progress) {
 
 }  // namespace
 
+Result<void> check_pdf(const fs::path& pdf) {
+  if (converter({}, {}, {}).empty()) return no_converter();
+  return require_place_of(pdf);
+}
+
 Result<void> write_pdf(const std::string& html, const fs::path& pdf, const Progress& progress) {
   const WorkFolder work;
   if (work.path().empty())
     return fail(ErrorCode::Io, fmt::format("make a temporary folder: {}", std::strerror(errno)));
   const fs::path page = work.path() / "report.html", made = work.path() / "report.pdf";
   const auto words = converter(page, made, work.path() / "profile");
-  if (words.empty())
-    return fail(ErrorCode::Io,
-                "--pdf: no converter is installed; install weasyprint or chromium, or print the "
-                "HTML report from a browser");
+  if (words.empty()) return no_converter();
   ABBE_TRY(replace_file(page, html));
 
   const auto child = start_converter(words);

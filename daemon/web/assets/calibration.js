@@ -362,12 +362,12 @@ function fieldsOf(method) {
   if (method === "mfb")
     return { bar: fileField("bar-file", "Bar (bar.toml)", ".toml", true),
       plan: fileField("plan-file", "Plan (plan.toml)", ".toml", true) };
-  const u = h("input", { type: "number", id: "reference-u", min: "0.01", step: "any", value: "1" });
+  const u = h("input", { type: "number", id: "reference-u", min: "0.01", step: "any" });
   return { calibrator: fileField("calibrator-file", "Ball array (calibrator.toml)", ".toml", true),
     reference: fileField("reference-file",
       "Points where V is known, which determine the rotation (errors.csv, optional)", ".csv", false),
     u_reference_um: { parts: [h("label", { for: "reference-u" },
-      "Standard uncertainty of that V, um"), u], read: () => Number(u.value) } };
+      "Standard uncertainty of that V, um"), u], read: () => u.value === "" ? undefined : Number(u.value) } };
 }
 
 /** The button that ends the running calibration; above the view, so that a hand finds it. */
@@ -418,7 +418,7 @@ export async function show(place) {
       : h("p", { class: "weak" }, "To begin or cancel a calibration, log in with the role calibrate."));
   };
   showControls(state.status ? running(state.status.session) : false);
-  let before = state.status?.session.state;
+  let before = state.status?.session.state, shown = "";
   const onStatus = (status) => {
     if (!status) return;
     const now = status.session.state;
@@ -427,7 +427,11 @@ export async function show(place) {
     if (["acquiring", "identifying"].includes(now) || (before === "warming" && now !== before))
       withdraw(Object.values(begun));
     before = now;
-    if (!parts.contains(document.activeElement)) parts.replaceChildren(...sessionParts(status.session));
+    // Drawn anew only when it has changed: so a command can be selected, and is read aloud once.
+    const latest = JSON.stringify(status.session);
+    if (latest === shown || parts.contains(document.activeElement)) return;
+    shown = latest;
+    parts.replaceChildren(...sessionParts(status.session));
   };
   if (state.status) onStatus(state.status);
 

@@ -10,6 +10,15 @@ let sound = null;
 
 const on = () => localStorage.getItem(kKept) === "on";
 
+/** Browsers let a page sound only after a click or a key: after a reload the first one switches it on. */
+const allow = () => {
+  if (!on()) return;
+  sound ??= new AudioContext();
+  sound.resume();
+};
+document.addEventListener("pointerdown", allow, true);
+document.addEventListener("keydown", allow, true);
+
 /** Two short tones; deeper for what is wrong. */
 function play(isWrong) {
   sound ??= new AudioContext();
@@ -31,7 +40,7 @@ function signal(text, isWrong) {
   play(isWrong);
   if (globalThis.Notification?.permission !== "granted") return;
   try {
-    new Notification(`abbe ${document.getElementById("machine").textContent}`, { body: text, tag: "abbe" });
+    new Notification(`abbe ${document.getElementById("machine").textContent}`, { body: text, tag: "abbe", renotify: true });
   } catch {
     // Chromium on Android shows notifications of service workers only: the sound remains.
   }

@@ -19,8 +19,6 @@ using daemon::ErrorCode;
 using daemon::Result;
 using nlohmann::json;
 
-constexpr double kUsualReference_um = 1.0;
-
 /// A file that the browser read.
 struct SentFile {
   std::string name, text;
@@ -52,11 +50,14 @@ Result<json> array_task(const json& body) {
     reference = std::move(*parsed);
   }
 
-  const double u_um = body.value("u_reference_um", kUsualReference_um);
+  if (!reference) return daemon::evemu_task(*calibrator, nullptr, 0.0);
+
+  const double u_um = body.value("u_reference_um", 0.0);
   if (!std::isfinite(u_um) || u_um <= 0.0)
     return daemon::fail(ErrorCode::Usage,
-                        fmt::format("u_reference_um = {}: must be more than 0", u_um));
-  return daemon::evemu_task(*calibrator, reference ? &*reference : nullptr, u_um / daemon::kUmPerM);
+                        "u_reference_um: give the standard uncertainty of the V in the reference "
+                        "file, in um: more than 0");
+  return daemon::evemu_task(*calibrator, &*reference, u_um / daemon::kUmPerM);
 }
 
 }  // namespace

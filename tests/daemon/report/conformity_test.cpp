@@ -58,6 +58,25 @@ TEST(Conformity, OfAValueThatIsNotEstimableIsNeither) {
   EXPECT_EQ(conformity_of_all(judged), Conformity::Neither);
 }
 
+// One tool offset: the model has EAX, but neither EAZ nor the error EC0Y of its own.
+TEST(Conformity, OfAnAngleThatIsNotEstimableIsNeitherAndHasALimitInUrad) {
+  auto values = certified_values(test::synthetic_document(3)).value();
+  const auto has = [&values](const std::string& key) {
+    for (const ValueGroup& group : values.groups)
+      for (const CertifiedValue& value : group.values)
+        if (value.key == key) return true;
+    return false;
+  };
+  ASSERT_FALSE(has("ECZ"));
+  const auto judged =
+      judge(values, {{.value = "ECZ", .limit_um_urad = 20.0, .is_angle = true}}).value();
+  EXPECT_EQ(judged[0].conformity, Conformity::Neither);
+  EXPECT_TRUE(judged[0].value.is_angle);
+  const auto length = judge(values, {{.value = "ECZ", .limit_um_urad = 20.0}});
+  ASSERT_FALSE(length);
+  EXPECT_THAT(length.error().details, Contains(HasSubstr("\"ECZ\": it is an angle: limit_urad")));
+}
+
 TEST(Conformity, NamesAllLimitsThatCannotBeJudged) {
   const auto values = certified_values(test::synthetic_document(3)).value();
   const auto judged = judge(values, {{.value = "X.Q", .limit_um_urad = 1.0},

@@ -186,7 +186,9 @@ TEST(ModelReport, StatesReasonsAndNotesApart) {
                             .actor = {"foreman", "parts are waiting", {}}});
   const std::string page = model_report(refused).value();
   EXPECT_THAT(page, HasSubstr("Red: the gate refused"));
-  const auto reasons = page.find("Reasons:"), notes = page.find("Notes, no reasons");
+  const auto reasons = page.find("Reasons:"), notes = page.find("To know about this model:");
+  ASSERT_NE(reasons, std::string::npos);
+  ASSERT_NE(notes, std::string::npos);
   EXPECT_LT(reasons, page.find("held out: no better"));
   EXPECT_LT(page.find("held out: no better"), notes);
   EXPECT_LT(notes, page.find("against the verdict by foreman"));

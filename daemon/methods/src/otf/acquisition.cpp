@@ -266,6 +266,8 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
     before_.clear();
     phase_ = Phase::Running;
     reason_ = "driving the path";
+    if (const auto& missing = start_.missing_at_start(); !missing.empty())
+      reason_ += fmt::format(", begun before READY: {}", missing);
     on_leg_at_ = point.time;
     points_.push_back(point);
     begin_leg(leg_, point, q);

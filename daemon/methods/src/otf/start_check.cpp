@@ -96,9 +96,12 @@ std::string StartCheck::missing() const {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-bool StartCheck::drives_first_leg(const calib::Vector3& q) const {
+/// Where the machine is after it has left the first vertex.
+StartCheck::Departure StartCheck::departure(const calib::Vector3& q) const {
   const auto leg = calib::otf::nearest_on_leg(options_.first_m, options_.second_m, q);
-  return leg.off_m <= options_.path_tolerance_m && leg.along_m > 2.0 * options_.vertex_tolerance_m;
+  if (leg.off_m > options_.path_tolerance_m) return Departure::ElsewhereThanThePath;
+  return leg.along_m > 2.0 * options_.vertex_tolerance_m ? Departure::OnFirstLeg
+                                                         : Departure::NearTheVertex;
 }
 
 void StartCheck::take(const Point& point) {
@@ -124,7 +127,9 @@ void StartCheck::take(const Point& point) {
     return;
   }
   ready_ = false;
-  if (was_at_start_ && drives_first_leg(*q_m_)) {
+  const Departure where = departure(*q_m_);
+  if (where == Departure::ElsewhereThanThePath) was_at_start_ = false;
+  if (was_at_start_ && where == Departure::OnFirstLeg) {
     was_at_start_ = false;
     missed_ = fmt::format(
         "start missed: the machine has left {}, and the run has not begun: {}. Drive back and wait "

@@ -18,8 +18,8 @@ struct CheckedConfig {
   /// One for each value that is possible but probably wrong, "file:line:column: key: what": a value
   /// in another unit, a forgotten table, or the number of a CPU that this computer does not have.
   std::vector<std::string> warnings;
-  /// The values that are still those of the example file, "machine.name \"mill 7\"", if the machine
-  /// has the name of the example; else empty.
+  /// The values of name, travel, target and host that are still those of the example file,
+  /// "machine.name \"mill 7\""; empty if fewer than two are.
   std::vector<std::string> of_the_example;
 };
 

@@ -12,8 +12,9 @@ namespace abbe::daemon {
 class Starvation {
  public:
   /// Call it about once a second with the number of samples so far. `nominal_hz`: samples per
-  /// second that the device sends; 0: not known. `streaming`: the device sends now. Returns what is
-  /// missing, "47 % of the 100 samples per second arrive: ..."; empty if enough arrive.
+  /// second that the device sends; 0: not known. Fewer than 20 in a second are not judged.
+  /// `streaming`: the device sends now. Returns what is missing, "47 % of the 100 samples per
+  /// second arrive: ..."; empty if enough arrive.
   [[nodiscard]] std::string look(double nominal_hz, bool streaming, protocol::HostTime now,
                                  std::uint64_t samples);
 

@@ -9,6 +9,10 @@
 
 namespace abbe::daemon {
 
+/// Before the work whose result becomes `pdf`: Io if no converter is installed, or if there is no
+/// folder for the file.
+[[nodiscard]] Result<void> check_pdf(const std::filesystem::path& pdf);
+
 /// Writes `pdf`. Io if no converter is installed, or if it fails or takes longer than three
 /// minutes. The converter reports nothing: `progress` gets the time that it has taken, as a share
 /// of that time and 10 s. It takes a few seconds for a report.

@@ -49,13 +49,15 @@ class StartCheck {
   /// All conditions hold: the machine may drive off.
   [[nodiscard]] bool ready() const noexcept { return ready_; }
   /// The machine has left the first vertex along its first leg, and the run has not begun. True
-  /// until it stands at the first vertex again.
+  /// until all conditions hold again.
   [[nodiscard]] bool missed() const noexcept { return !missed_.empty(); }
+  /// What was missing when the machine last stood at the first vertex; empty: nothing.
+  [[nodiscard]] const std::string& missing_at_start() const noexcept { return missing_at_start_; }
   /// Message for the operator: what to wait for, that the machine may drive off, or what was
   /// missing when it drove off.
   [[nodiscard]] std::string text() const;
   /// Conditions in the order in which the operator meets them: tracker, axes, position,
-  /// standstill; a tenth of a second old at most.
+  /// standstill; a tenth of a second old at most, without points from the tracker 1.5 s.
   [[nodiscard]] StartState state() const { return {ready_, missed(), conditions_}; }
 
  private:
@@ -71,7 +73,8 @@ class StartCheck {
   [[nodiscard]] std::vector<StartCondition> judged() const;
   void judge(protocol::HostTime now);
   [[nodiscard]] std::string missing() const;
-  [[nodiscard]] bool drives_first_leg(const calib::Vector3& q) const;
+  enum class Departure { NearTheVertex, OnFirstLeg, ElsewhereThanThePath };
+  [[nodiscard]] Departure departure(const calib::Vector3& q) const;
 
   Options options_;
   std::array<Counts, kWindow> window_{};  // ring, the latest at newest_

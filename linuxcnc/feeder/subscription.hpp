@@ -9,10 +9,10 @@
 #include <optional>
 #include <string>
 
-#include "abbe/dds/publisher_pin.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
 #include "abbe/messages/error_lattice.hpp"
+#include "abbe/subscriber/publisher_pin.hpp"
 #include "correction_field.hpp"
 
 namespace abbe::linuxcnc {

@@ -17,7 +17,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "abbe/dds/message_filter.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 
 namespace {
 

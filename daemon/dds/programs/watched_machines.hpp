@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "abbe/dds/participant_addresses.hpp"
-#include "abbe/dds/publisher_pin.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
+#include "abbe/subscriber/publisher_pin.hpp"
 
 namespace abbe::dds {
 

@@ -14,9 +14,9 @@
 #include <string>
 #include <utility>
 
-#include "abbe/dds/message_filter.hpp"
 #include "abbe/dds/payload_type.hpp"
 #include "abbe/result/try.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 #include "builtin_profile.hpp"
 #include "interfaces.hpp"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/dds/message_filter.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 #include "rtps_message.hpp"
 
 namespace abbe::test {

@@ -1,4 +1,4 @@
-#include "abbe/dds/message_filter.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "abbe/dds/fragment_reassembly.hpp"
-#include "abbe/dds/message_filter.hpp"
+#include "abbe/subscriber/internal/fragment_reassembly.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 #include "filter_messages.hpp"
 
 namespace abbe::dds {

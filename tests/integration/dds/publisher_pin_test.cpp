@@ -1,4 +1,4 @@
-#include "abbe/dds/publisher_pin.hpp"
+#include "abbe/subscriber/publisher_pin.hpp"
 
 #include <gtest/gtest.h>
 

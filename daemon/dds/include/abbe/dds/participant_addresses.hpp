@@ -8,7 +8,7 @@
 #include <string>
 
 #include "abbe/dds/participant.hpp"
-#include "abbe/dds/publisher_pin.hpp"
+#include "abbe/subscriber/publisher_pin.hpp"
 
 namespace abbe::dds {
 

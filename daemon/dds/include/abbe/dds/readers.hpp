@@ -11,7 +11,7 @@
 #include <span>
 
 #include "abbe/dds/participant.hpp"
-#include "abbe/dds/publisher_pin.hpp"
+#include "abbe/subscriber/publisher_pin.hpp"
 
 namespace abbe::dds {
 

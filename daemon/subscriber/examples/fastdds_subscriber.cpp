@@ -8,9 +8,8 @@
 // of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
 // identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
 // name is used, and no other one while the program runs. Fast DDS calls the
-// listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp,
-// message_filter and sequence_window (daemon/dds). As a last defence against strangers limit the
-// memory of the process, for example with MemoryMax= of its systemd unit.
+// listener from its own threads. As a last defence against strangers limit the memory of the
+// process, for example with MemoryMax= of its systemd unit.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <algorithm>
 #include <chrono>
@@ -32,8 +31,8 @@
 #include <string>
 #include <thread>
 
-#include "abbe/dds/message_filter.hpp"
-#include "abbe/dds/publisher_pin.hpp"
+#include "abbe/subscriber/message_filter.hpp"
+#include "abbe/subscriber/publisher_pin.hpp"
 #include "abbe_v1PubSubTypes.h"
 
 using namespace eprosima::fastdds::dds;
@@ -348,7 +347,7 @@ void limit_memory(DomainParticipantQos& qos) {
 }
 
 /// Some messages that any participant of the domain can send crash Fast DDS 2.9. The filter removes
-/// them (abbe/dds/message_filter.hpp).
+/// them (abbe/subscriber/message_filter.hpp).
 void filter_messages(DomainParticipantQos& qos, bool secured) {
   auto& transports = qos.transport();
   if (transports.user_transports.empty()) {

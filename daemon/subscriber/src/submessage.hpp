@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "abbe/dds/message_filter.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 #include "rtps_fields.hpp"
 
 namespace abbe::dds::rtps_message {

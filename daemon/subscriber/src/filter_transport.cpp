@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/dds/fragment_reassembly.hpp"
-#include "abbe/dds/message_filter.hpp"
+#include "abbe/subscriber/internal/fragment_reassembly.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 #include "rtps_fields.hpp"
 
 namespace abbe::dds {

@@ -1,4 +1,4 @@
-#include "abbe/dds/message_filter.hpp"
+#include "abbe/subscriber/message_filter.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/dds/fragment_reassembly.hpp"
+#include "abbe/subscriber/internal/fragment_reassembly.hpp"
 #include "announced_values.hpp"
 #include "announcement_check.hpp"
 #include "protected_structure.hpp"

@@ -53,7 +53,7 @@
 #include <span>
 #include <vector>
 
-#include "abbe/dds/sequence_window.hpp"
+#include "abbe/subscriber/sequence_window.hpp"
 
 namespace abbe::dds {
 

@@ -1,4 +1,4 @@
-#include "abbe/dds/sequence_window.hpp"
+#include "abbe/subscriber/sequence_window.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "abbe/dds/fragment_reassembly.hpp"
+#include "abbe/subscriber/internal/fragment_reassembly.hpp"
 
 #include <algorithm>
 #include <utility>

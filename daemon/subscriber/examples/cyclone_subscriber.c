@@ -8,7 +8,12 @@
    of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. With --machine only
    the machine NAME is used, and only if its identity is MACHINE_ID (`abbe machine identity`);
    without it the first machine of each name, and no other one while the program runs. The program
-   has one thread; Cyclone DDS calls the listener from another one. */
+   has one thread; Cyclone DDS calls the listener from another one. As a last defence against
+   strangers limit the memory of the process, for example with MemoryMax= of its systemd unit.
+
+   Exit codes: 2 a wrong argument, 4 Cyclone DDS refuses. */
+#include <abbe/subscriber/publisher_pin.h>
+#include <errno.h>
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -21,7 +26,10 @@
 #include "dds/dds.h"
 
 /* Strangers may make up machines and writers; they cannot take the place of a given machine. */
-enum { MOST_MACHINES = 256, MOST_PUBLISHERS = 8, MOST_WRITERS = 4096 };
+enum { MOST_MACHINES = 256, MOST_WRITERS = 4096 };
+
+/* The ports of higher domains do not exist. */
+enum { HIGHEST_DOMAIN = 232 };
 
 static const int64_t second_ns = INT64_C(1000000000), millisecond_ns = INT64_C(1000000);
 
@@ -32,30 +40,28 @@ static const int64_t longest_silence_ns = INT64_C(1500000000);
 /* --machine NAME MACHINE_ID; NULL: not given. */
 static const char *given_name, *given_machine_id;
 
-/* State of one publisher (a DDS participant) of one machine, independent of other publishers. */
-struct publisher {
-  dds_guid_t participant;
-  int64_t first_ns, last_ns; /* times of its samples; last_ns 0: entry is free */
-  int64_t alone_ns;          /* time of sending since the last sample of the pinned publisher */
-  bool foreign;
-  abbe_v1_Identity identity;   /* which machine the publisher is */
-  bool identified;             /* `identity` is valid */
-  const char* ignored_because; /* NULL: it is not, or not yet known */
-  abbe_v1_ModelState state;
-  dds_instance_handle_t state_from; /* writer of `state`; 0: there is no valid state */
-  int64_t state_received_ns;
-  int64_t first_vector_ns, last_vector_ns, least_offset_ns; /* see delay_of(); 0: no vector yet */
+/* Delay of vectors, see delay_of(). */
+struct delay {
+  int64_t first_ns, last_ns; /* times of vectors; 0: no vector yet */
+  int64_t least_offset_ns;
   bool inherited;
 };
 
+/* State of one publisher (a DDS participant) of one machine, independent of other publishers. */
+struct publisher {
+  int64_t since_ns; /* first_ns of its place in the pin */
+  abbe_v1_ModelState state;
+  dds_instance_handle_t state_from; /* writer of `state`; 0: there is no valid state */
+  int64_t state_received_ns;
+  struct delay delay;
+};
+
 /* One of the machines whose data are published in the domain. Only samples of its pinned publisher
-   are used. */
+   are used (publisher_pin.h). */
 struct machine {
-  char machine_id[sizeof(((abbe_v1_Identity*)0)->machine_id)];
-  bool has_machine_id; /* `machine_id` was given, or that of the first pinned publisher */
   char name[sizeof(((abbe_v1_ModelState*)0)->machine)];
-  struct publisher publishers[MOST_PUBLISHERS];
-  struct publisher* pinned;
+  struct abbe_publisher_pin pin;
+  struct publisher publishers[ABBE_PIN_PLACES]; /* by their places in `pin` */
   int64_t ignored_reported_ns;
   abbe_v1_Compensation applied; /* the last vector, while it may be applied */
   int64_t applied_age_ns;       /* when it arrived */
@@ -107,175 +113,109 @@ static struct machine* find_machine(const char* name) {
     struct machine* m = &machines[i];
     if (m->name[0] == '\0') {
       strcpy(m->name, name);
-      m->has_machine_id = given_machine_id != NULL;
-      if (m->has_machine_id) snprintf(m->machine_id, sizeof m->machine_id, "%s", given_machine_id);
+      abbe_pin_init(&m->pin, given_machine_id, abbe_pin_silence_ns);
     }
     if (strcmp(m->name, name) == 0) return m;
   }
   return NULL;
 }
 
-/* True if two GUIDs are of the same participant: all of its writers share the first 12 bytes of the
-   GUID. */
-static bool same_participant(const dds_guid_t* a, const dds_guid_t* b) {
-  return memcmp(a->v, b->v, 12) == 0;
-}
-
-static void print_participant(const char* format, const char* machine, const dds_guid_t* id) {
+/* Prints the GUID prefix of a participant as Fast DDS and Cyclone DDS do. */
+static void print_participant(const char* before, const uint8_t* id, const char* behind) {
   char text[27] = "";
-  for (int i = 0; i < 12; ++i)
+  for (int i = 0; i < ABBE_PIN_ID_BYTES; ++i)
     snprintf(text + strlen(text), sizeof text - strlen(text), "%s%02x", i == 4 || i == 8 ? "." : "",
-             id->v[i]);
-  printf(format, machine, text);
-}
-
-/* The entry of a publisher. If all entries are in use, a new publisher gets the entry whose last
-   sample is oldest, but never that of the pinned publisher. The new publisher takes over the delay
-   measurement of the pinned one, because its clock is the same if abbe-dds only restarted. */
-static struct publisher* find_publisher(struct machine* m, const dds_guid_t* participant) {
-  struct publisher* entry = NULL;
-  for (struct publisher* p = m->publishers; p < m->publishers + MOST_PUBLISHERS; ++p) {
-    if (p->last_ns != 0 && same_participant(&p->participant, participant)) return p;
-    if (p != m->pinned && (entry == NULL || p->last_ns < entry->last_ns)) entry = p;
-  }
-  memset(entry, 0, sizeof *entry);
-  entry->participant = *participant;
-  entry->first_ns = entry->last_ns = now_in_ns();
-  if (m->pinned == NULL) return entry;
-  entry->first_vector_ns = m->pinned->first_vector_ns;
-  entry->last_vector_ns = m->pinned->last_vector_ns;
-  entry->least_offset_ns = m->pinned->least_offset_ns;
-  entry->inherited = entry->first_vector_ns != 0;
-  return entry;
+             id[i]);
+  printf("%s %s%s\n", before, text, behind);
 }
 
 static void print_state(const abbe_v1_ModelState* state) {
   printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
 }
 
-/* True if the machine has seen another publisher of its name and machine_id. */
-static bool is_copied(const abbe_v1_Identity* identity) {
-  char copy[sizeof identity->machine + 40];
-  snprintf(copy, sizeof copy, "the same machine_id, as machine %s,", identity->machine);
-  return identity->twin && strncmp(identity->twin_seen, copy, strlen(copy)) == 0;
-}
-
-/* True if a foreign publisher that is there states the identity of `p`: it is then the copy that `p`,
-   the restarted publisher, has seen. */
-static bool is_of_foreign(const struct machine* m, const struct publisher* p, int64_t now_ns) {
-  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o)
-    if (o->foreign && o->last_ns != 0 && now_ns - o->last_ns < 1500 * millisecond_ns &&
-        o->identified && strcmp(o->identity.machine_id, p->identity.machine_id) == 0)
-      return true;
-  return false;
-}
-
-/* True if another publisher that is neither pinned nor foreign states the same identity as `p`, or
-   like `p` none. */
-static bool has_copy(const struct machine* m, const struct publisher* p, int64_t now_ns) {
-  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o) {
-    if (o == p || o == m->pinned || o->foreign || now_ns - o->last_ns >= 1500 * millisecond_ns)
-      continue;
-    if (o->last_ns != 0 && o->identified == p->identified &&
-        strcmp(o->identity.machine_id, p->identity.machine_id) == 0)
-      return true;
+/* What is reported of a publisher that is not used; NULL: nothing. */
+static const char* ignored_because(enum abbe_pin_verdict verdict) {
+  switch (verdict) {
+    case ABBE_PIN_FOREIGN:
+      return "another publisher";
+    case ABBE_PIN_OTHER_MACHINE:
+      return "another machine of this name, publisher";
+    case ABBE_PIN_AMBIGUOUS:
+      return "one of several machines of this name, publisher";
+    case ABBE_PIN_COPIED:
+      return "one of several with one identity, publisher";
+    case ABBE_PIN_UNIDENTIFIED:
+      return "without a machine_id, publisher";
+    default:
+      return NULL;
   }
-  return false;
 }
 
-/* True if `p` has sent for 5 s without stating an identity, as an abbe-dds of an earlier version
-   does, and neither an identity was given nor another publisher states one. */
-static bool has_no_identity(const struct machine* m, const struct publisher* p, int64_t now_ns) {
-  bool others_have = false;
-  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o)
-    others_have |= o->last_ns != 0 && o->identified;
-  return !p->identified && !m->has_machine_id && !others_have &&
-         now_ns - p->first_ns >= 5 * second_ns;
-}
-
-/* True if `p`, which is not pinned, may be pinned now. It must be the same machine as before, not
-   only have the same name: a publisher of another machine_id is never pinned. Of two machines that
-   know of each other (`twin`) none is the first, and of two publishers with one identity (a copied
-   disk) none is chosen. A publisher that sent beside the pinned one is foreign, and never pinned.
-   Another one replaces the pinned one if that has been silent for 300 ms and the other has sent for
-   30 ms since then. Reasons and limits: publisher_pin.hpp and dds.md. */
-static bool may_be_pinned(struct machine* m, struct publisher* p, int64_t now_ns) {
-  p->ignored_because = NULL;
-  if (!p->identified && !has_no_identity(m, p, now_ns)) return false;
-  if (p->identified && p->identity.machine_id[0] == '\0')
-    p->ignored_because = "%s: without a machine_id, publisher %s is ignored\n";
-  else if (m->has_machine_id && strcmp(m->machine_id, p->identity.machine_id) != 0)
-    p->ignored_because = "%s: another machine of this name, publisher %s is ignored\n";
-  else if ((is_copied(&p->identity) && !is_of_foreign(m, p, now_ns)) ||
-           (!p->foreign && has_copy(m, p, now_ns)))
-    p->ignored_because = "%s: one of several with one identity, publisher %s is ignored\n";
-  else if (!m->has_machine_id && p->identity.twin)
-    p->ignored_because = "%s: one of several machines of this name, publisher %s is ignored\n";
-  else if (p->foreign)
-    p->ignored_because = "%s: another publisher %s is ignored\n";
-  if (p->ignored_because != NULL) return false;
-  return m->pinned == NULL || (now_ns - m->pinned->last_ns >= 300 * millisecond_ns &&
-                               p->alone_ns >= 30 * millisecond_ns);
-}
-
-/* True if `p`, which sent a sample now, is the pinned publisher of the machine. */
-static bool is_pinned(struct machine* m, struct publisher* p) {
-  const int64_t now_ns = now_in_ns(), pause_ns = now_ns - p->last_ns;
-  p->last_ns = now_ns;
-
-  if (m->pinned != p) {
-    p->alone_ns += pause_ns < 10 * millisecond_ns ? pause_ns : 10 * millisecond_ns;
-    if (!may_be_pinned(m, p, now_ns)) return false;
-    if (m->pinned != NULL) m->pinned->last_ns = 0; /* frees the entry */
-    m->pinned = p;
-    m->has_machine_id |= p->identified;
-    if (p->identified) strcpy(m->machine_id, p->identity.machine_id);
-    print_participant(p->identified ? "%s: publisher is %s\n"
-                                    : "%s: publisher is %s, an abbe-dds of an earlier version "
-                                      "without identity\n",
-                      m->name, &p->participant);
-    if (p->state_from != 0) print_state(&p->state);
-  }
-
-  for (struct publisher* other = m->publishers; other < m->publishers + MOST_PUBLISHERS; ++other) {
-    if (other == p || other->last_ns == 0) continue;
-    other->foreign |= now_ns - other->first_ns >= 100 * millisecond_ns;
-    other->alone_ns = 0;
-  }
-  return true;
-}
-
-static void report_ignored_publisher(struct machine* m, const struct publisher* p) {
+static void report(struct machine* m, enum abbe_pin_verdict verdict, const uint8_t* id) {
   const int64_t now_ns = now_in_ns();
-  if (p->ignored_because == NULL ||
-      (m->ignored_reported_ns != 0 && now_ns - m->ignored_reported_ns < 10 * second_ns))
-    return;
-  m->ignored_reported_ns = now_ns;
-  print_participant(p->ignored_because, m->name, &p->participant);
+  const char* reason = ignored_because(verdict);
+  char text[sizeof m->name + 64];
+  if (verdict == ABBE_PIN_NEWLY_PINNED) {
+    snprintf(text, sizeof text, "%s: publisher is", m->name);
+    print_participant(
+        text, id,
+        m->pin.has_machine_id ? "" : ", an abbe-dds of an earlier version without identity");
+  } else if (reason != NULL &&
+             (m->ignored_reported_ns == 0 || now_ns - m->ignored_reported_ns >= 10 * second_ns)) {
+    m->ignored_reported_ns = now_ns;
+    snprintf(text, sizeof text, "%s: %s", m->name, reason);
+    print_participant(text, id, " is ignored");
+  }
 }
 
-/* The publisher of a sample; NULL if the writer of the sample does not exist any more. */
-static struct publisher* publisher_of(struct machine* m, dds_entity_t reader,
-                                      dds_instance_handle_t writer) {
+/* The publisher of a sample. `identity`: the sample, if it is an Identity. NULL if the machine has
+   no entry or the writer of the sample does not exist any more. A new publisher takes over the delay
+   measurement of the pinned one, because its clock is the same if abbe-dds only restarted. */
+static struct publisher* heard(struct machine* m, dds_entity_t reader, dds_instance_handle_t writer,
+                               const abbe_v1_Identity* identity) {
+  if (m == NULL) return NULL;
   dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(reader, writer);
-  if (m == NULL || endpoint == NULL) {
-    if (endpoint != NULL) dds_builtintopic_free_endpoint(endpoint);
-    return NULL;
-  }
-  struct publisher* p = find_publisher(m, &endpoint->participant_key);
+  if (endpoint == NULL) return NULL;
+  uint8_t id[ABBE_PIN_ID_BYTES];
+  memcpy(id, endpoint->participant_key.v, sizeof id);
   dds_builtintopic_free_endpoint(endpoint);
+
+  const int former = m->pin.pinned;
+  const enum abbe_pin_verdict verdict =
+      identity == NULL ? abbe_pin_heard(&m->pin, id, now_in_ns())
+                       : abbe_pin_identified(&m->pin, id, identity->machine_id,
+                                             abbe_pin_twin_of(identity->twin, identity->twin_seen,
+                                                              identity->machine),
+                                             now_in_ns());
+  const int place = abbe_pin_place_of(&m->pin, id);
+  struct publisher* p = &m->publishers[place];
+  if (p->since_ns != m->pin.places[place].first_ns) {
+    struct delay delay = {0, 0, 0, false};
+    if (former >= 0) delay = m->publishers[former].delay;
+    delay.inherited = delay.first_ns != 0;
+    memset(p, 0, sizeof *p);
+    p->since_ns = m->pin.places[place].first_ns;
+    p->delay = delay;
+  }
+  report(m, verdict, id);
+  if (verdict == ABBE_PIN_NEWLY_PINNED && p->state_from != 0) print_state(&p->state);
   return p;
+}
+
+/* The publisher whose samples are used; NULL: none. */
+static struct publisher* pinned_of(struct machine* m) {
+  return m->pin.pinned < 0 ? NULL : &m->publishers[m->pin.pinned];
 }
 
 /* Discards the ModelState of every writer that is not alive. A writer that becomes alive again
    repeats its ModelState within a second. */
 static void discard_dead_states(void) {
   for (struct machine* m = machines; m < machines + MOST_MACHINES; ++m) {
-    for (struct publisher* p = m->publishers; p < m->publishers + MOST_PUBLISHERS; ++p) {
+    for (struct publisher* p = m->publishers; p < m->publishers + ABBE_PIN_PLACES; ++p) {
       const bool recent = now_in_ns() - p->state_received_ns < longest_silence_ns;
       if (p->state_from == 0 || (recent && is_alive(p->state_from))) continue;
       p->state_from = 0;
-      if (p == m->pinned) printf("%s: not alive\n", m->name);
+      if (p == pinned_of(m)) printf("%s: not alive\n", m->name);
     }
   }
 }
@@ -285,17 +225,17 @@ static void discard_dead_states(void) {
    clocks of the two computers may differ in offset, and in rate by 200 ppm. A measurement that was
    taken over from another publisher is kept if clock offset plus transit time of the first vector
    differ from it by at most 20 ms. */
-static int64_t delay_of(const abbe_v1_Compensation* c, struct publisher* p) {
-  const int64_t now_ns = now_in_ns(), since_last_ns = now_ns - p->last_vector_ns;
+static int64_t delay_of(const abbe_v1_Compensation* c, struct delay* d) {
+  const int64_t now_ns = now_in_ns(), since_last_ns = now_ns - d->last_ns;
   const int64_t offset_ns = now_ns - (c->host_time_ns + c->age_ns);
-  const bool same_clock = llabs(offset_ns - p->least_offset_ns) <= 20 * millisecond_ns;
-  if (p->inherited && !same_clock) p->first_vector_ns = 0;
-  p->inherited = false;
-  p->least_offset_ns += (since_last_ns < second_ns ? since_last_ns : second_ns) / 5000;
-  if (p->first_vector_ns == 0 || offset_ns < p->least_offset_ns) p->least_offset_ns = offset_ns;
-  if (p->first_vector_ns == 0) p->first_vector_ns = now_ns;
-  p->last_vector_ns = now_ns;
-  return offset_ns - p->least_offset_ns;
+  const bool same_clock = llabs(offset_ns - d->least_offset_ns) <= 20 * millisecond_ns;
+  if (d->inherited && !same_clock) d->first_ns = 0;
+  d->inherited = false;
+  d->least_offset_ns += (since_last_ns < second_ns ? since_last_ns : second_ns) / 5000;
+  if (d->first_ns == 0 || offset_ns < d->least_offset_ns) d->least_offset_ns = offset_ns;
+  if (d->first_ns == 0) d->first_ns = now_ns;
+  d->last_ns = now_ns;
+  return offset_ns - d->least_offset_ns;
 }
 
 /* The rule of abbe_v1.idl: NULL if the vector may be applied, else the reason. age_ns: age of the
@@ -310,7 +250,7 @@ static const char* why_not(const abbe_v1_Compensation* c, int64_t age_ns,
   if (!c->tool_ok) return "the model is not valid for this tool";
   /* The fastest vector of the first 0.2 s serves as the reference; before that all vectors may have
      been late. */
-  if (p->last_vector_ns - p->first_vector_ns <= second_ns / 5)
+  if (p->delay.last_ns - p->delay.first_ns <= second_ns / 5)
     return "the reference delay is not known yet";
   if (age_ns > c->validity_ns) return "too old";
   return NULL;
@@ -321,42 +261,21 @@ static const char* why_not(const abbe_v1_Compensation* c, int64_t age_ns,
 static void keep(const abbe_v1_ModelState* state, dds_entity_t reader,
                  dds_instance_handle_t writer) {
   struct machine* m = find_machine(state->machine);
-  struct publisher* p = publisher_of(m, reader, writer);
+  struct publisher* p = heard(m, reader, writer, NULL);
   if (p == NULL) return;
   p->state = *state;
   p->state_from = writer;
   p->state_received_ns = now_in_ns();
-  if (!is_pinned(m, p)) {
-    report_ignored_publisher(m, p);
-    return;
-  }
-  print_state(state);
-}
-
-/* Which machine a publisher is. The pinned publisher is released if abbed behind it has become
-   another machine. */
-static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
-                     dds_instance_handle_t writer) {
-  struct machine* m = find_machine(identity->machine);
-  struct publisher* p = publisher_of(m, reader, writer);
-  if (p == NULL) return;
-  p->identity = *identity;
-  p->identified = true;
-  if (m->pinned == p && (!m->has_machine_id || strcmp(m->machine_id, identity->machine_id) != 0))
-    m->pinned = NULL;
-  if (!is_pinned(m, p)) report_ignored_publisher(m, p);
+  if (p == pinned_of(m)) print_state(state);
 }
 
 static void decide(const abbe_v1_Compensation* c, dds_entity_t reader,
                    dds_instance_handle_t writer) {
   struct machine* m = find_machine(c->machine);
-  struct publisher* p = publisher_of(m, reader, writer);
+  struct publisher* p = heard(m, reader, writer, NULL);
   if (p == NULL) return;
-  const int64_t age_ns = c->age_ns + delay_of(c, p);
-  if (!is_pinned(m, p)) {
-    report_ignored_publisher(m, p);
-    return;
-  }
+  const int64_t age_ns = c->age_ns + delay_of(c, &p->delay);
+  if (p != pinned_of(m)) return;
   const char* reason = why_not(c, age_ns, p);
   m->applied_ns = 0;
   if (reason != NULL) {
@@ -376,9 +295,9 @@ static void withdraw(void) {
   for (struct machine* m = machines; m < machines + MOST_MACHINES; ++m) {
     if (m->applied_ns == 0) continue;
     const int64_t since_ns = now_in_ns() - m->applied_ns;
-    const char* reason = m->pinned == NULL
-                             ? "the publisher states another machine"
-                             : why_not(&m->applied, m->applied_age_ns + since_ns, m->pinned);
+    const struct publisher* p = pinned_of(m);
+    const char* reason = p == NULL ? "the publisher states another machine"
+                                   : why_not(&m->applied, m->applied_age_ns + since_ns, p);
     if (reason == NULL) continue;
     printf("%s: do not apply: %s\n", m->name, reason);
     m->applied_ns = 0;
@@ -473,22 +392,51 @@ static dds_entity_t read_compensation(dds_entity_t participant) {
   return dds_create_reader(participant, topic, NULL, NULL); /* best effort, volatile, keep last 1 */
 }
 
+/* A decimal number up to HIGHEST_DOMAIN; -1: `text` is none. */
+static int domain_of(const char* text) {
+  char* end = NULL;
+  errno = 0;
+  const long domain = strtol(text, &end, 10);
+  const bool number = text[0] >= '0' && text[0] <= '9' && *end == '\0' && errno == 0;
+  return number && domain <= HIGHEST_DOMAIN ? (int)domain : -1;
+}
+
+static int refuse_arguments(const char* why) {
+  fprintf(stderr,
+          "cyclone_subscriber: %s\n"
+          "usage: cyclone_subscriber DOMAIN [KEYS] [--machine NAME MACHINE_ID]\n",
+          why);
+  return 2;
+}
+
 int main(int argc, char** argv) {
   setvbuf(stdout, NULL, _IOLBF, 0);
   if (argc > 3 && strcmp(argv[argc - 3], "--machine") == 0) {
+    struct abbe_publisher_pin pin;
     given_name = argv[argc - 2];
     given_machine_id = argv[argc - 1];
     argc -= 3;
+    if (!abbe_pin_init(&pin, given_machine_id, abbe_pin_silence_ns) || !pin.has_machine_id)
+      return refuse_arguments("MACHINE_ID is not the identity of a machine");
   }
-  const dds_domainid_t domain = argc > 1 ? (dds_domainid_t)atoi(argv[1]) : 0;
-  if (argc > 2) configure_for_keys(domain);
+  if (argc < 2 || argc > 3) return refuse_arguments("wrong number of arguments");
+  const int domain = domain_of(argv[1]);
+  if (domain < 0) return refuse_arguments("DOMAIN is not a number from 0 to 232");
+  if (argc > 2) configure_for_keys((dds_domainid_t)domain);
   dds_qos_t* participant_qos = argc > 2 ? qos_with_keys(argv[2]) : NULL;
-  dds_entity_t participant = dds_create_participant(domain, participant_qos, NULL);
+  dds_entity_t participant = dds_create_participant((dds_domainid_t)domain, participant_qos, NULL);
   dds_delete_qos(participant_qos);
-  if (participant < 0) return 4;
+  if (participant < 0) {
+    fprintf(stderr, "cyclone_subscriber: cannot join domain %d: %s\n", domain,
+            dds_strretcode(participant));
+    return 4;
+  }
   dds_entity_t identities = read_identity(participant), states = read_state(participant),
                vectors = read_compensation(participant);
-  if (identities < 0 || states < 0 || vectors < 0) return 4;
+  if (identities < 0 || states < 0 || vectors < 0) {
+    fputs("cyclone_subscriber: cannot read the topics\n", stderr);
+    return 4;
+  }
 
   abbe_v1_Identity* identity = abbe_v1_Identity__alloc();
   abbe_v1_ModelState* state = abbe_v1_ModelState__alloc();
@@ -506,7 +454,8 @@ int main(int argc, char** argv) {
     for (bool any = true; any;) {
       any = false;
       while (dds_take(identities, (void**)&identity, &info, 1, 1) > 0) {
-        if (info.valid_data) identify(identity, identities, info.publication_handle);
+        if (info.valid_data)
+          heard(find_machine(identity->machine), identities, info.publication_handle, identity);
       }
       if (dds_take(states, (void**)&state, &info, 1, 1) > 0) {
         any = true;

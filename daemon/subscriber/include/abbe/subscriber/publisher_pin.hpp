@@ -7,8 +7,8 @@
 ///   have the same identity (a copied disk), none of them is chosen.
 /// An abbe-dds of an earlier version has no topic Identity: it is used by its name alone if no
 /// machine_id was given and no publisher states one.
-/// The header uses the standard library only, so that subscribers can copy it; the Cyclone DDS
-/// example implements the same rule in C.
+/// The header uses the standard library only, so that subscribers can copy it; publisher_pin.h has
+/// the same rule in C.
 ///
 /// The rule protects against a participant that starts later. Without DDS Security it does not
 /// protect against one that forges the identity and starts first or takes over after the pinned one

@@ -7,11 +7,17 @@
 // may be applied may no longer be, because nothing newer has arrived. KEYS is the folder
 // of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
 // identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
-// name is used, and no other one while the program runs. Fast DDS calls the
-// listener from its own threads. As a last defence against strangers limit the memory of the
-// process, for example with MemoryMax= of its systemd unit.
+// name is used, and no other one while the program runs. PROFILES.xml has a participant profile
+// "abbe"; without it UDP on all interfaces is used. Fast DDS calls the listener from its own
+// threads. As a last defence against strangers limit the memory of the process, for example with
+// MemoryMax= of its systemd unit.
+//
+// Exit codes: 2 a wrong argument, 3 an unusable PROFILES.xml, 4 Fast DDS refuses.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <abbe/subscriber/message_filter.hpp>
+#include <abbe/subscriber/publisher_pin.hpp>
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -29,10 +35,9 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <thread>
 
-#include "abbe/subscriber/message_filter.hpp"
-#include "abbe/subscriber/publisher_pin.hpp"
 #include "abbe_v1PubSubTypes.h"
 
 using namespace eprosima::fastdds::dds;
@@ -195,7 +200,7 @@ class Listener : public DataReaderListener {
     SampleInfo info;
     Sample sample;
     while (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK)
-      if (info.valid_data && !sample.machine().empty()) use(sample, info.publication_handle);
+      if (info.valid_data && sample.machine().size() > 0) use(sample, info.publication_handle);
   }
 
   struct Source {
@@ -215,8 +220,9 @@ class Listener : public DataReaderListener {
     const Verdict verdict =
         identity == nullptr
             ? machine.pin.heard(id, now)
-            : machine.pin.identified(id, identity->machine_id(),
-                                     twin_of(identity->twin(), identity->twin_seen(), name), now);
+            : machine.pin.identified(id, identity->machine_id().to_string(),
+                                     twin_of(identity->twin(), identity->twin_seen().c_str(), name),
+                                     now);
     const auto [found, is_new] = machine.publishers.try_emplace(id);
     if (is_new && former)
       found->second.delay = machine.publishers[*former].delay.for_next_publisher();
@@ -269,14 +275,16 @@ class Listener : public DataReaderListener {
 
   /// A sample that tells which machine a publisher is.
   void identify(const Identity& identity, const Writer& writer) {
-    if (has_place(identity.machine())) heard(identity.machine(), writer, &identity);
+    const std::string name = identity.machine().to_string();
+    if (has_place(name)) heard(name, writer, &identity);
   }
 
   /// Keeps a ModelState, also one from a publisher that is not pinned, because it may be pinned
   /// later.
   void keep(const ModelState& state, const Writer& writer) {
-    if (!has_place(state.machine())) return;
-    const auto [publisher, pinned] = heard(state.machine(), writer);
+    const std::string name = state.machine().to_string();
+    if (!has_place(name)) return;
+    const auto [publisher, pinned] = heard(name, writer);
     publisher.state = state;
     publisher.state_from = writer;
     publisher.heard = SteadyClock::now();
@@ -290,18 +298,19 @@ class Listener : public DataReaderListener {
   }
 
   void decide(const Compensation& c, const Writer& writer) {
-    if (!has_place(c.machine())) return;
-    const auto [publisher, pinned] = heard(c.machine(), writer);
+    const std::string name = c.machine().to_string();
+    if (!has_place(name)) return;
+    const auto [publisher, pinned] = heard(name, writer);
     const std::int64_t age_ns = c.age_ns() + publisher.delay.of_ns(c);
     if (!pinned) return;
-    auto& applied = machines_[c.machine()].applied;
+    auto& applied = machines_[name].applied;
     applied.reset();
     if (const char* reason = why_not(c, age_ns, publisher, is_alive(publisher))) {
-      std::printf("%s: do not apply: %s\n", c.machine().c_str(), reason);
+      std::printf("%s: do not apply: %s\n", name.c_str(), reason);
     } else {
       applied = {c, age_ns, SteadyClock::now()};
       const double age_ms = static_cast<double>(age_ns) * 1e-6;
-      std::printf("%s: apply V = %.3f %.3f %.3f um, %.3f ms old\n", c.machine().c_str(),
+      std::printf("%s: apply V = %.3f %.3f %.3f um, %.3f ms old\n", name.c_str(),
                   c.vector_m()[0] * 1e6, c.vector_m()[1] * 1e6, c.vector_m()[2] * 1e6, age_ms);
     }
   }
@@ -407,6 +416,24 @@ bool read_topic(DomainParticipant* participant, Subscriber* subscriber, TypeSupp
   return topic != nullptr && subscriber->create_datareader(topic, qos, listener) != nullptr;
 }
 
+/// A decimal number of a domain whose ports exist [DDSI-RTPS 2.5, 9.6.2].
+std::optional<unsigned> domain_of(std::string_view text) {
+  constexpr unsigned kHighest = 232;
+  unsigned domain = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), domain);
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  return is_number && domain <= kHighest ? std::optional(domain) : std::nullopt;
+}
+
+int refuse(int exit_code, const std::string& why) {
+  std::fprintf(stderr, "fastdds_subscriber: %s\n", why.c_str());
+  if (exit_code == 2)
+    std::fputs(
+        "usage: fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]] [--machine NAME MACHINE_ID]\n",
+        stderr);
+  return exit_code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -415,7 +442,12 @@ int main(int argc, char** argv) {
   if (argc > 3 && std::string(argv[argc - 3]) == "--machine") {
     machine_ids[argv[argc - 2]] = argv[argc - 1];
     argc -= 3;
+    if (machine_ids.begin()->second.empty()) return refuse(2, "MACHINE_ID is empty");
   }
+  if (argc < 2 || argc > 4) return refuse(2, "wrong number of arguments");
+  const auto domain = domain_of(argv[1]);
+  if (!domain) return refuse(2, "DOMAIN is not a number from 0 to 232");
+
   auto* factory = DomainParticipantFactory::get_instance();
   DomainParticipantQos participant_qos;
   // The default lease of 20 s may be shorter than a suspension of this process. abbe-dds would then
@@ -425,7 +457,7 @@ int main(int argc, char** argv) {
   if (argc > 2 && (factory->load_XML_profiles_file(argv[2]) != ReturnCode_t::RETCODE_OK ||
                    factory->get_participant_qos_from_profile("abbe", participant_qos) !=
                        ReturnCode_t::RETCODE_OK)) {
-    return 3;
+    return refuse(3, std::string("no participant profile \"abbe\" can be read from ") + argv[2]);
   }
   // Fast DDS tries so many ports. With its default of 100 the participants beyond the first hundred
   // of a computer receive nothing, and no error is reported.
@@ -433,9 +465,10 @@ int main(int argc, char** argv) {
   limit_memory(participant_qos);
   if (argc > 3) use_keys(argv[3], participant_qos);
   filter_messages(participant_qos, argc > 3);
-  auto* participant = factory->create_participant(
-      argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 0, participant_qos);
-  if (participant == nullptr) return 4;
+  auto* participant = factory->create_participant(*domain, participant_qos);
+  if (participant == nullptr)
+    return refuse(4, "cannot join domain " + std::to_string(*domain) +
+                         (argc > 3 ? std::string(" with the keys in ") + argv[3] : ""));
   static Listener listener(machine_ids);
   auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
 
@@ -460,7 +493,7 @@ int main(int argc, char** argv) {
                   read_topic(participant, subscriber,
                              without_type_object(new Checked<abbe::v1::CompensationPubSubType>),
                              "abbe/v1/Compensation", live, &listener);
-  if (!ok) return 4;
+  if (!ok) return refuse(4, "cannot read the topics");
   std::puts("waiting; end with Ctrl-C");
   for (;;) {
     std::this_thread::sleep_for(std::chrono::milliseconds{5});

@@ -70,8 +70,9 @@ Names names_in(const fs::path& file) {
   if (extension == ".cpp" || extension == ".hpp") {
     return found(text_of(file), R"(#\s*include\s*["<]abbe/([a-z_]+)/)");
   }
+  // Not the words of abbe-subscriber-config.cmake.
   if (file.filename() == "CMakeLists.txt")
-    return found(text_of(file), R"(\b(?:abbe::)?([a-z_]+)\b)");
+    return found(text_of(file), R"((?:^|[^-\w])(?:abbe::)?([a-z_]+)\b(?!-))");
   return {};
 }
 

@@ -23,7 +23,7 @@ void TrackerDevice::receive() ABBE_RT {
     protocol::visit_trivial([this](const auto& m) ABBE_RT { take(m); }, *message);
   }
 
-  const TrackerCounters& counters = receiver_.counters();
+  const TrackerCounters counters = receiver_.counters();
   const std::uint64_t gaps = counters.gaps + counters.beam_losses;
   board_.gaps.add(gaps - std::exchange(gaps_seen_, gaps));
 }

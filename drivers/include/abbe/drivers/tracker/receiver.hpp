@@ -23,7 +23,7 @@
 #include <variant>
 
 #include "abbe/drivers/clock_model.hpp"
-#include "abbe/drivers/device_time_check.hpp"
+#include "abbe/drivers/tracker/burst_times.hpp"
 #include "abbe/protocol/emscon/framer.hpp"
 #include "abbe/protocol/emscon/results.hpp"
 #include "abbe/protocol/rt.hpp"
@@ -92,13 +92,11 @@ class TrackerReceiver {
   /// The next message; nullopt if more bytes are needed.
   [[nodiscard]] std::optional<TrackerMessage> next() ABBE_RT;
 
-  [[nodiscard]] const TrackerCounters& counters() const ABBE_RT { return counters_; }
-  [[nodiscard]] ClockStatus clock() const ABBE_RT { return clock_.status(); }
-  [[nodiscard]] double skew_beyond_limit() const ABBE_RT { return clock_.skew_beyond_limit(); }
+  [[nodiscard]] TrackerCounters counters() const ABBE_RT;
+  [[nodiscard]] ClockStatus clock() const ABBE_RT { return times_.clock(); }
+  [[nodiscard]] double skew_beyond_limit() const ABBE_RT { return times_.skew_beyond_limit(); }
 
  private:
-  using TimeVerdict = DeviceTimeCheck::Verdict;
-
   void connection_began() ABBE_RT;
   [[nodiscard]] std::optional<TrackerMessage> understand(std::span<const std::byte> packet) ABBE_RT;
   [[nodiscard]] std::optional<TrackerMessage> take(const emscon::Answer& answer) ABBE_RT;
@@ -116,32 +114,19 @@ class TrackerReceiver {
                                               std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] TrackerMessage burst(std::size_t count) ABBE_RT;
 
-  [[nodiscard]] bool is_ahead(protocol::DeviceTime t) const ABBE_RT;
-  [[nodiscard]] std::size_t judge_times(const emscon::MultiResult& result,
-                                        std::size_t first) ABBE_RT;
-  void begin_time_base() ABBE_RT;
-  void convert(const emscon::MultiResult& result, std::size_t first, std::size_t end) ABBE_RT;
   void convert(const emscon::MultiPoint& from, emscon::Status status,
                protocol::TrackerPoint& to) ABBE_RT;
-  void refuse_time(protocol::TrackerPoint& point) ABBE_RT;
-  void follow(protocol::TrackerPoint& point) ABBE_RT;
-  void mark_hole(std::chrono::nanoseconds since_last, protocol::TrackerPoint& point) ABBE_RT;
-  void mark_pending(protocol::SampleHead& head) ABBE_RT;
   void weather(const emscon::Environment& environment, const protocol::SampleHead& head) ABBE_RT;
   void beam_lost() ABBE_RT;
 
   TrackerReceiverOptions options_;
-  ClockModel clock_;
-  TrackerCounters counters_;
+  static_assert(emscon::kMaxMultiPoints <= BurstTimes::kMostPoints);
+  BurstTimes times_;
+  TrackerCounters counters_;  ///< except those of times_
   protocol::HostTime arrival_{};
-  bool accepting_ = true;  ///< points have the units that the session set
-  bool silenced_ = false;  ///< a protocol error occurred on this connection
-  bool beam_lost_ = false;
-  protocol::SampleFlags pending_flags_ = 0;  ///< for the next point
-  bool points_came_ = false;                 ///< on this connection
-  DeviceTimeCheck times_;
-  std::optional<protocol::DeviceTime> last_;  ///< of the last point with a time that fits
-  std::array<TimeVerdict, emscon::kMaxMultiPoints> verdicts_{};
+  bool accepting_ = true;     ///< points have the units that the session set
+  bool silenced_ = false;     ///< a protocol error occurred on this connection
+  bool points_came_ = false;  ///< on this connection
   emscon::Environment environment_{};
   protocol::HostTime environment_sent_{};  ///< arrival of the packet it was passed on with
   bool environment_known_ = false;

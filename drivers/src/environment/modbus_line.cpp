@@ -1,10 +1,8 @@
 #include "abbe/drivers/environment/modbus_line.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <modbus/modbus.h>
 #include <poll.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -97,26 +95,6 @@ Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
 void ModbusLine::close() noexcept {
   context_.reset();
   lock_ = {};
-}
-
-SerialLock& SerialLock::operator=(SerialLock&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  return *this;
-}
-
-SerialLock::~SerialLock() {
-  if (fd_ >= 0) ::close(fd_);
-}
-
-Result<void> SerialLock::take(const std::string& path) {
-  fd_ = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (fd_ < 0) return failed("open", errno);
-  if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return {};
-  if (errno != EWOULDBLOCK) return failed("lock", errno);
-  return tl::unexpected(
-      Error{ErrorCode::Unreachable,
-            "open: this serial line is in use by another program, or by an [[environment]] that "
-            "names it by another path: give all devices of one line the same path"});
 }
 
 Result<void> ModbusLine::send(const modbus::ReadRequest& request) {

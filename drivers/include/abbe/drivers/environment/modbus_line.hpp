@@ -15,6 +15,7 @@
 
 #include "abbe/drivers/error.hpp"
 #include "abbe/drivers/host_addresses.hpp"
+#include "abbe/drivers/serial_line.hpp"
 #include "abbe/protocol/modbus/read.hpp"
 
 struct _modbus;  // NOLINT(bugprone-reserved-identifier): libmodbus' own name of modbus_t
@@ -27,8 +28,6 @@ struct ModbusTcp {
   std::string host;  ///< address or name
   std::uint16_t port = modbus::kTcpPort;
 };
-
-enum class Parity : char { None = 'N', Even = 'E', Odd = 'O' };
 
 /// A serial line. Use a path that does not change when the adapter is plugged in again:
 /// /dev/serial/by-id/...
@@ -43,26 +42,6 @@ using ModbusAddress = std::variant<ModbusTcp, ModbusSerial>;
 [[nodiscard]] modbus::Transport transport_of(const ModbusAddress& address) noexcept;
 /// Text of an address: "10.0.0.7:502", "/dev/ttyUSB0 19200 8E1".
 [[nodiscard]] std::string text_of(const ModbusAddress& address);
-
-/// Exclusive lock of a serial line (flock). If the adapter is not plugged in at the start, abbe
-/// cannot recognise that two configured paths lead to the same line; the lock then makes the second
-/// opening fail. It also excludes other programs that use flock. TIOCEXCL would exclude all
-/// programs except those of root, but it stays set after a process is killed while another one has
-/// the line open.
-class SerialLock {
- public:
-  SerialLock() = default;
-  SerialLock(SerialLock&& other) noexcept { *this = std::move(other); }
-  SerialLock& operator=(SerialLock&& other) noexcept;
-  ~SerialLock();  ///< releases the lock
-
-  /// Locks the line at `path`. Error Unreachable: no such path, or the line is already locked. Call
-  /// once.
-  [[nodiscard]] Result<void> take(const std::string& path);
-
- private:
-  int fd_ = -1;
-};
 
 class ModbusLine {
  public:

@@ -127,6 +127,15 @@ TEST(TrackerLine, TakesSeparatorAndDecimalSignAsConfigured) {
   expect_fault("1;;3", format, What::NotANumber, 2);
 }
 
+TEST(TrackerLine, HasAnEmptyColumnBetweenTwoTabsThatSeparate) {
+  auto format = format_of({X, Ignored, Y, Z});
+  format.separator = '\t';
+  const auto line = decode("1\t\t 2 \t3", format);
+  ASSERT_TRUE(line);
+  EXPECT_DOUBLE_EQ(line->p_tracker_m[1], 2e-3);
+  expect_fault("\t1\t2\t3", format, What::NotANumber, 1);
+}
+
 TEST(TrackerLine, KeepsTheTimeToTheNanosecond) {
   auto format = format_of({Time, X, Y, Z});
   const auto ns_of = [&](std::string_view time) {

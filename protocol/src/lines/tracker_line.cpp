@@ -7,12 +7,13 @@
 #include <numbers>
 #include <system_error>
 
+#include "abbe/protocol/lines/fields.hpp"
+
 namespace abbe::protocol::lines {
 namespace {
 
 using What = LineFault::What;
 
-constexpr std::size_t kLongestNumber = 40;
 constexpr std::size_t kColumnKinds = static_cast<std::size_t>(Column::Status) + 1;
 constexpr double kRightAngle_rad = std::numbers::pi / 2.0;
 /// Some instruments count several turns; more than two are a wrong unit.
@@ -21,63 +22,8 @@ constexpr double kLargestAzimuth_rad = 4.0 * std::numbers::pi;
 /// more.
 constexpr double kLargestElevation_rad = kRightAngle_rad + 1e-3;
 
-bool is_blank(char c) noexcept {
-  return c == ' ' || c == '\t';
-}
 bool is_digit(char c) noexcept {
   return c >= '0' && c <= '9';
-}
-
-std::string_view trimmed(std::string_view text) noexcept {
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-/// The columns of a line, one after the other.
-class Fields {
- public:
-  Fields(std::string_view line, char separator) noexcept
-      : rest_(trimmed(line)), separator_(separator) {}
-
-  /// nullopt: there is no further column.
-  std::optional<std::string_view> next() noexcept {
-    if (rest_.empty()) return std::nullopt;
-    std::size_t end = 0;
-    while (end < rest_.size() && !ends(rest_[end])) ++end;
-    const std::string_view field = trimmed(rest_.substr(0, end));
-    rest_.remove_prefix(end);
-    if (!rest_.empty()) rest_.remove_prefix(1);  // the separator
-    rest_ = trimmed(rest_);
-    return field;
-  }
-
- private:
-  [[nodiscard]] bool ends(char c) const noexcept {
-    return separator_ == ' ' ? is_blank(c) : c == separator_;
-  }
-
-  std::string_view rest_;
-  char separator_;
-};
-
-std::optional<double> number(std::string_view text, char decimal_sign) noexcept {
-  std::array<char, kLongestNumber> copy;  // NOLINT: filled below
-  if (!text.empty() && text.front() == '+') {
-    text.remove_prefix(1);
-    if (!text.empty() && text.front() == '-') return std::nullopt;
-  }
-  if (text.empty() || text.size() > copy.size()) return std::nullopt;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (c == '.' && decimal_sign != '.') return std::nullopt;  // a thousands separator
-    copy[i] = c == decimal_sign ? '.' : c;
-  }
-  double value = 0.0;
-  const char* const end = copy.data() + text.size();
-  const auto read = std::from_chars(copy.data(), end, value);
-  if (read.ec != std::errc{} || read.ptr != end || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 int digits_of(TimeUnit unit) noexcept {
@@ -268,8 +214,8 @@ tl::expected<TrackerLine, LineFault> decode(std::string_view line,
 }
 
 bool is_comment(std::string_view line) ABBE_RT {
-  line = trimmed(line);
-  return line.empty() || line.front() == '#';
+  const auto begin = line.find_first_not_of(" \t");
+  return begin == std::string_view::npos || line[begin] == '#';
 }
 
 bool is_heading(std::string_view line) ABBE_RT {

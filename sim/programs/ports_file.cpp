@@ -12,6 +12,10 @@ namespace abbe::sim {
 Ports ports_of(Simulation& simulation, const std::string& can_interface) {
   Ports ports;
   if (simulation.tracker()) ports.tracker = simulation.tracker()->port();
+  if (simulation.line_tracker()) {
+    ports.line_tracker = simulation.line_tracker()->where();
+    if (const auto port = simulation.line_tracker()->port(); port != 0) ports.tracker = port;
+  }
   if (simulation.control()) ports.control = simulation.control()->port();
   ports.can_interface = can_interface;
   if (simulation.bus() && can_interface.empty()) ports.can = simulation.bus()->port();
@@ -44,7 +48,10 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
     ABBE_TRY(write_file(path, lines));
   }
 
-  if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
+  if (!ports.line_tracker.empty())
+    fmt::print("tracker: {}\n", ports.line_tracker);
+  else if (ports.tracker)
+    fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
   if (ports.control)
     fmt::print("control: position records on 127.0.0.1:{} (UDP)\n", *ports.control);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);

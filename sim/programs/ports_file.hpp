@@ -25,6 +25,7 @@ struct NamedPlace {
 
 struct Ports {
   std::optional<std::uint16_t> tracker;
+  std::string line_tracker;              ///< where it prints its lines; empty: it speaks emScon
   std::optional<std::uint16_t> control;  ///< UDP, position records
   std::optional<std::uint16_t> can;
   std::vector<NamedPlace> environment;

@@ -138,6 +138,7 @@ void read_machine_tables(Section root, SetupDraft& draft) {
   tracker.get("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro,
               kNotNegativeNumber);
   get_port(tracker, "port", simulation.tracker_port);
+  read_lines(tracker, simulation);
   read_nests(tracker, simulation);
   Section encoder = root.child("encoder");
   get_port(encoder, "peer_port", simulation.bus->port);

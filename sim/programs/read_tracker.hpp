@@ -11,4 +11,7 @@ void read_sim_tracker(Section section, SetupDraft& draft);
 /// [[sim.tracker.nest]] gives other positions.
 void read_nests(Section& tracker, SimulationSetup& simulation);
 
+/// `protocol = "lines"` with its keys, in [tracker] of the machine file or in [sim.tracker].
+void read_lines(Section& tracker, SimulationSetup& simulation);
+
 }  // namespace abbe::sim

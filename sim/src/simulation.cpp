@@ -31,13 +31,7 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
   std::unique_ptr<Simulation> simulation(
       new Simulation(setup.truth, std::move(*path), setup, std::move(control)));
 
-  if (setup.tracker) {
-    auto tracker = TrackerServer::open(
-        setup.tracker_port,
-        std::make_unique<TrackerDevice>(*setup.tracker, simulation->machine_, now));
-    ABBE_TRY(tracker);
-    simulation->tracker_.emplace(std::move(*tracker));
-  }
+  ABBE_TRY(simulation->open_tracker(setup, now));
 
   if (setup.bus) {
     auto nodes = setup.nodes;
@@ -81,9 +75,32 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
   return simulation;
 }
 
+Result<void> Simulation::open_tracker(const SimulationSetup& setup, HostTime now) {
+  if (!setup.tracker) return {};
+  if (!setup.tracker_lines) {
+    auto tracker = TrackerServer::open(
+        setup.tracker_port, std::make_unique<TrackerDevice>(*setup.tracker, machine_, now));
+    ABBE_TRY(tracker);
+    tracker_.emplace(std::move(*tracker));
+    return {};
+  }
+  const LineTrackerOptions options{.model = setup.tracker->model,
+                                   .delay = setup.tracker->delay,
+                                   .separation = setup.tracker_lines->separation,
+                                   .format = setup.tracker_lines->format};
+  LineOutput output = setup.tracker_lines->output;
+  output.port = setup.tracker_port;
+  auto tracker =
+      LineTrackerServer::open(output, std::make_unique<LineTracker>(options, machine_, now), now);
+  ABBE_TRY(tracker);
+  line_tracker_.emplace(std::move(*tracker));
+  return {};
+}
+
 void Simulation::poll(HostTime now) {
   if (control_) control_->poll(now);
   if (tracker_) tracker_->poll(now);
+  if (line_tracker_) line_tracker_->poll(now);
   start_machine(now);
   touch(now);
   while (const auto* fault = faults_.take_due(machine_, now)) inject(*fault, now);
@@ -110,9 +127,10 @@ void Simulation::start_machine(HostTime now) {
     return;
   }
   if (!start_when_streaming_ || held_) return;
-  if (tracker_) {
-    if (const auto streaming = tracker_->device().first_stream())
-      machine_.start(*streaming + standstill_);
+  if (tracker_ || line_tracker_) {
+    const auto streaming =
+        tracker_ ? tracker_->device().first_stream() : line_tracker_->device().first_stream();
+    if (streaming) machine_.start(*streaming + standstill_);
   } else if (!counter_cards_.empty() && counter_cards_.front().card().scanning()) {
     machine_.start(now + standstill_);
   }
@@ -140,6 +158,10 @@ void Simulation::inject(const ScheduledFault& next, HostTime now) {
     tracker_->device().inject(next.fault, now);
     tracker_->poll(now);
   }
+  if (next.target == FaultTarget::Tracker && line_tracker_) {
+    line_tracker_->device().inject(next.fault, now);
+    line_tracker_->poll(now);
+  }
   if (next.target == FaultTarget::MeasuringMachine && measuring_machine_)
     measuring_machine_->device().inject(next.fault, now);
   if (next.target == FaultTarget::Environment) inject_environment(next.fault, now);
@@ -156,6 +178,7 @@ void Simulation::inject_environment(const Fault& fault, HostTime now) {
 HostTime Simulation::next_due() const {
   HostTime due = faults_.next_due(machine_);
   if (tracker_) due = std::min(due, tracker_->next_due());
+  if (line_tracker_) due = std::min(due, line_tracker_->next_due());
   if (!bus_apart_) due = std::min(due, next_bus_due());
   for (const ModbusServer& server : environment_) due = std::min(due, server.next_due());
   for (const UsbipServer& card : counter_cards_) due = std::min(due, card.next_due());
@@ -166,6 +189,7 @@ HostTime Simulation::next_due() const {
 void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
   if (control_) fds.push_back({control_->fd(), POLLIN, 0});
   if (tracker_) tracker_->add_poll_fds(fds);
+  if (line_tracker_) line_tracker_->add_poll_fds(fds);
   if (bus_ && !bus_apart_) fds.push_back({bus_->fd(), POLLIN, 0});
   for (const ModbusServer& server : environment_) server.add_poll_fds(fds);
   for (const UsbipServer& card : counter_cards_) card.add_poll_fds(fds);

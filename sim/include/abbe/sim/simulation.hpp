@@ -16,12 +16,19 @@
 #include "abbe/sim/encoder_bus.hpp"
 #include "abbe/sim/fault_timetable.hpp"
 #include "abbe/sim/ippdme_server.hpp"
+#include "abbe/sim/line_tracker_server.hpp"
 #include "abbe/sim/modbus_server.hpp"
 #include "abbe/sim/touched_surface.hpp"
 #include "abbe/sim/tracker_server.hpp"
 #include "abbe/sim/usbip_server.hpp"
 
 namespace abbe::sim {
+
+struct PrintedLines {
+  lines::LineFormat format;
+  std::chrono::nanoseconds separation = std::chrono::milliseconds{2};  ///< of two points
+  LineOutput output;
+};
 
 struct SimulationSetup {
   TruthMachine truth;
@@ -35,6 +42,9 @@ struct SimulationSetup {
   std::chrono::nanoseconds standstill = std::chrono::seconds{2};
   std::optional<TrackerOptions> tracker;
   std::uint16_t tracker_port = 0;
+  /// The tracker prints lines instead of emScon. Model and delay are those of `tracker`, the port
+  /// is `tracker_port`.
+  std::optional<PrintedLines> tracker_lines;
   /// UDP port of the position records of a control, which the machine then follows instead of
   /// `path`; 0: the kernel chooses it. nullopt: no control.
   std::optional<std::uint16_t> control_port;
@@ -79,6 +89,7 @@ class Simulation {
   [[nodiscard]] const VirtualMachine& machine() const { return machine_; }
   [[nodiscard]] const std::optional<ControlPort>& control() const { return control_; }
   [[nodiscard]] std::optional<TrackerServer>& tracker() { return tracker_; }
+  [[nodiscard]] std::optional<LineTrackerServer>& line_tracker() { return line_tracker_; }
   [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
   [[nodiscard]] const std::vector<ModbusServer>& environment() const { return environment_; }
   [[nodiscard]] std::deque<UsbipServer>& counter_cards() { return counter_cards_; }
@@ -90,6 +101,7 @@ class Simulation {
  private:
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup,
              std::optional<ControlPort> control);
+  [[nodiscard]] Result<void> open_tracker(const SimulationSetup& setup, HostTime now);
   void start_machine(HostTime now);
   void touch(HostTime now);
   void inject_environment(const Fault& fault, HostTime now);
@@ -101,6 +113,7 @@ class Simulation {
   bool held_;
   std::chrono::nanoseconds standstill_;
   std::optional<TrackerServer> tracker_;
+  std::optional<LineTrackerServer> line_tracker_;
   std::optional<EncoderBus> bus_;
   bool bus_apart_;
   FaultTimetable bus_faults_;

@@ -13,6 +13,7 @@
 #include "abbe/result/try.hpp"
 #include "kinds.hpp"
 #include "running.hpp"
+#include "tracker_lines.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -83,6 +84,8 @@ Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) 
   const Config& config = start.config;
   const auto& tracker = config.of<TrackerConfig>();
   if (!tracker) return nullptr;
+  if (tracker->lines)
+    return start_line_tracker(start, line_options(*tracker, config.daemon.speed), start.first);
   auto options = device_options(*tracker, config.daemon.speed);
   if (config.daemon.simulated) options.clock_advice = kBusyComputer;
   auto running = run(drivers::TrackerDevice::create(options, start.time),
@@ -129,7 +132,10 @@ void name_tracker(const Config& config, DeviceNames& names) {
 
 std::unique_ptr<RawDecoders> decoders_of_tracker(const Config& config,
                                                  const std::optional<CountingProgress>&) {
-  return config.of<TrackerConfig>() ? std::make_unique<TrackerDecoder>(config) : nullptr;
+  const auto& tracker = config.of<TrackerConfig>();
+  if (!tracker) return nullptr;
+  if (tracker->lines) return line_decoder(line_options(*tracker, config.daemon.speed));
+  return std::make_unique<TrackerDecoder>(config);
 }
 
 }  // namespace
@@ -163,6 +169,21 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
   }
 
   options.clock.max_constant_delay = config.max_constant_delay;
+  return options;
+}
+
+drivers::LineTrackerOptions line_options(const TrackerConfig& config, double speed) {
+  drivers::LineTrackerOptions options;
+  options.name = config.name;
+  options.address = config.lines->address;
+  options.receiver.format = config.lines->format;
+  options.receiver.clock.max_constant_delay = config.max_constant_delay;
+  options.receiver.stationary_time = config.stationary_time;
+  if (config.mode == TrackerModeConfig::Continuous)
+    options.receiver.time_separation =
+        std::chrono::nanoseconds{std::llround(1e9 / config.point_rate_hz)};
+  options.connect_timeout = stretched(config.connect_timeout, speed);
+  options.silence_timeout = stretched(config.silence_timeout, speed);
   return options;
 }
 

@@ -110,6 +110,24 @@ axes = [
 ]
 )";
 
+/// A tracker that sends lines of text, beside a counter card.
+const std::string kLineTracker = kCounterCard + R"(
+[tracker]
+protocol = "lines"
+transport = "tcp"
+host = "192.168.0.1"
+port = 7001
+columns = ["time", "range", "azimuth", "elevation", "status"]
+valid_status = ["0"]
+length_unit = "m"
+angle_unit = "deg"
+time_unit = "ms"
+separator = "semicolon"
+decimal = "comma"
+point_rate_hz = 250
+weather = "compute"
+)";
+
 const std::string kCoolantCorrectsY = R"(
 [[thermal]]
 axis = "Y"
@@ -143,6 +161,18 @@ const std::vector<Base>& bases() {
                           std::regex{"clock_MHz = 10"}, "clock_MHz = 12"),
        {{"counter_card.axes.offset_mm", ""}}},  // [reference] gives it
       {"counter card alone", kCounterCard},
+      {"tracker that sends lines",
+       kLineTracker,
+       {{"tracker.protocol", ""},
+        {"tracker.host", R"("192.168.0.2")"},
+        {"tracker.transport", R"("udp")"},
+        {"tracker.columns", R"(["time", "range", "azimuth", "zenith", "status"])"},
+        {"tracker.length_unit", R"("mm")"},
+        {"tracker.angle_unit", R"("gon")"},
+        {"tracker.time_unit", R"("us")"},
+        {"tracker.separator", R"("tab")"},
+        {"tracker.decimal", R"("point")"},
+        {"tracker.weather", R"("none")"}}},
       {"encoders of the machine",
        kExternalEncoders,
        // The nodes end where the travel ends.

@@ -12,6 +12,7 @@
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
 #include "plausible.hpp"
+#include "read_lines.hpp"
 
 namespace abbe::daemon {
 
@@ -165,6 +166,71 @@ double default_u_scale(WeatherConfig weather, const toml::node* air) {
   return corrected ? 0.0 : u_of_unmeasured_air();
 }
 
+/// As read_tracker_mode(). A program that prints lines decides about rate and duration; abbe must
+/// know them.
+void read_mode_of_lines(ClassifiedSection& tracker, TrackerConfig& out) {
+  using protocol::lines::Column;
+  constexpr std::int64_t kLongest_ms = 60'000;
+  tracker.get_word<TrackerModeConfig>(operation("mode"), out.mode,
+                                      {{"continuous", TrackerModeConfig::Continuous},
+                                       {"stationary", TrackerModeConfig::Stationary}});
+  const bool stationary = out.mode == TrackerModeConfig::Stationary;
+  if (stationary) {
+    std::int64_t time_ms = out.stationary_time / std::chrono::milliseconds{1};
+    tracker.get_integer(operation("stationary_time_ms"), time_ms, 1, kLongest_ms, Need::Required);
+    out.stationary_time = std::chrono::milliseconds{time_ms};
+    out.silence_timeout = std::chrono::seconds{60};  // a person moves the reflector meanwhile
+  } else {
+    tracker.get(operation("point_rate_hz"), out.point_rate_hz, kPlain, {0.1, 10e3}, Need::Required);
+    if (out.lines->format.column_count > 0 && !out.lines->format.has(Column::Time))
+      tracker.fault("columns",
+                    "needs \"time\": lines come in bursts, so their arrival does not show when a "
+                    "point was measured (without it only mode = \"stationary\" is possible)");
+  }
+  const auto unused = stationary ? "point_rate_hz" : "stationary_time_ms";
+  if (tracker.has(unused))
+    tracker.fault(unused, fmt::format("has no meaning with mode = \"{}\"",
+                                      stationary ? "stationary" : "continuous"));
+}
+
+/// The points come as lines of text. What abbe would send to a controller has no meaning.
+void read_line_tracker(ClassifiedSection& tracker, const toml::node* air, TrackerConfig& out) {
+  tracker.state(Role::Measurement, "protocol", "lines");
+  out.lines = read_lines(tracker);
+  read_mode_of_lines(tracker, out);
+  tracker.get_word<WeatherConfig>(
+      measurement("weather"), out.weather,
+      {{"none", WeatherConfig::None}, {"compute", WeatherConfig::Compute}}, Need::Required);
+  if (!tracker.get(operation("u_scale_ppm"), out.u_scale, kMicro, kNotNegative))
+    out.u_scale = default_u_scale(out.weather, air);
+  tracker.get(measurement("max_constant_delay_us"), out.max_constant_delay, kMicro, kNotNegative);
+  tracker.get(operation("connect_timeout_s"), out.connect_timeout, kPlain, kPositive);
+  tracker.get(operation("silence_timeout_s"), out.silence_timeout, kPlain, kPositive);
+  for (const auto key : {"command_timeout_s", "initialize_timeout_s", "reflector",
+                         "home_after_initialize", "search_radius_mm", "search_timeout_s"})
+    if (tracker.has(key))
+      tracker.fault(key, "has no meaning with protocol = \"lines\": abbe sends nothing");
+}
+
+void read_emscon_tracker(ClassifiedSection& tracker, const toml::node* air, TrackerConfig& out) {
+  refuse_lines_keys(tracker);
+  const Role points = tracker.has("host") ? Role::Measurement : Role::Operation;
+  const bool has_host = get_host(tracker, operation("host"), out.host);
+  tracker.get_integer(operation("port"), out.port, 1, 65535);
+  read_tracker_mode(tracker, out);
+  tracker.get_word<WeatherConfig>(Key{"weather", points}, out.weather,
+                                  {{"none", WeatherConfig::None},
+                                   {"read", WeatherConfig::Read},
+                                   {"compute", WeatherConfig::Compute}});
+
+  if (!tracker.get(operation("u_scale_ppm"), out.u_scale, kMicro, kNotNegative))
+    out.u_scale = default_u_scale(out.weather, air);
+  read_tracker_timeouts(tracker, points, out);
+  read_beam(tracker, points, out);
+  if (!has_host && tracker.has("port") && !tracker.has("host"))
+    tracker.fault("host", "missing, but a port is given");
+}
+
 void read_tracker(ClassifiedSection& root, Config& out, StreamNames& names) {
   ClassifiedSection tracker = root.child("tracker");
   read_noise(tracker, out.machine);
@@ -176,24 +242,16 @@ void read_tracker(ClassifiedSection& root, Config& out, StreamNames& names) {
                   "needs no [[tracker.nest]]: with nests the offset of the ranges is "
                   "estimated beside the drift, and is not kept");
   TrackerConfig config;
-  const Role points = tracker.has("host") ? Role::Measurement : Role::Operation;
-  const bool has_host = get_host(tracker, operation("host"), config.host);
   get_bounded(tracker, operation("name"), config.name, bound_of<v1::TrackerPoint>("device"));
-  tracker.get_integer(operation("port"), config.port, 1, 65535);
-  read_tracker_mode(tracker, config);
-  tracker.get_word<WeatherConfig>(Key{"weather", points}, config.weather,
-                                  {{"none", WeatherConfig::None},
-                                   {"read", WeatherConfig::Read},
-                                   {"compute", WeatherConfig::Compute}});
-
-  if (!tracker.get(operation("u_scale_ppm"), config.u_scale, kMicro, kNotNegative))
-    config.u_scale = default_u_scale(config.weather, root.node(stated("air")));
-  read_tracker_timeouts(tracker, points, config);
-  read_beam(tracker, points, config);
-  if (!has_host && tracker.has("port") && !tracker.has("host"))
-    tracker.fault("host", "missing, but a port is given");
+  bool as_lines = false;
+  tracker.get_word<bool>(operation("protocol"), as_lines, {{"emscon", false}, {"lines", true}});
+  const toml::node* const air = root.node(stated("air"));
+  if (as_lines)
+    read_line_tracker(tracker, air, config);
+  else
+    read_emscon_tracker(tracker, air, config);
   tracker.close();
-  if (!has_host) return;
+  if (!as_lines && config.host.empty()) return;
   names.take(config.name, tracker);
   out.of<TrackerConfig>() = std::move(config);
 }
@@ -204,6 +262,9 @@ std::vector<std::string> tracker_summary(const Config& config) {
   const auto mode = tracker->mode == TrackerModeConfig::Stationary
                         ? std::string{"stationary"}
                         : fmt::format("{:g} points per second", tracker->point_rate_hz);
+  if (tracker->lines)
+    return {fmt::format("lines ({}) from {}, {}", format_text(tracker->lines->format),
+                        drivers::text_of(tracker->lines->address), mode)};
   return {fmt::format("{}:{}, {}", tracker->host, tracker->port, mode)};
 }
 
@@ -219,7 +280,8 @@ std::optional<TrackerSource> points_of_tracker(const Config& config) {
 
   switch (tracker->weather) {
     case WeatherConfig::None:
-      source.air = TrackerSource::Air::Assumed;
+      // abbe cannot set the air of a program that prints lines.
+      source.air = tracker->lines ? TrackerSource::Air::LastSet : TrackerSource::Air::Assumed;
       source.air_setting = "tracker.weather = \"none\"";
       break;
     case WeatherConfig::Read:

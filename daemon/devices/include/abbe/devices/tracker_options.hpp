@@ -2,6 +2,7 @@
 /// The options of the tracker driver, the same for a live device and for its replay. Pure.
 
 #include "abbe/config/kinds/tracker.hpp"
+#include "abbe/drivers/lines/tracker_device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 
 namespace abbe::daemon {
@@ -10,5 +11,8 @@ namespace abbe::daemon {
 /// stretched().
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config,
                                                            double speed);
+
+/// As device_options(), for a tracker with lines.
+[[nodiscard]] drivers::LineTrackerOptions line_options(const TrackerConfig& config, double speed);
 
 }  // namespace abbe::daemon

@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 
+#include "abbe/config/kinds/tracker_lines.hpp"
+
 namespace abbe::daemon {
 
 struct ConfigKind;
@@ -29,6 +31,8 @@ struct TrackerSearchConfig {
 struct TrackerConfig {
   static const ConfigKind kKind;
   std::string name = "tracker";
+  /// The points come as lines of text; `host`, `port` and what emScon alone has are not used.
+  std::optional<LinesConfig> lines;
   std::string host;
   std::uint16_t port = 700;
   TrackerModeConfig mode = TrackerModeConfig::Continuous;

@@ -60,6 +60,24 @@ void read_serials(const std::string& configuration, std::map<std::string, std::s
   }
 }
 
+/// Reads from the recorded configuration how the lines of the tracker came.
+void read_transport(const std::string& configuration, std::map<std::string, LineOutput>& lines) {
+  const auto root = sections::parse_bounded(configuration, "recorded configuration");
+  if (!root) return;
+  const auto tracker = (*root)["tracker"];
+  if (tracker["protocol"].value_or(std::string{}) != "lines") return;
+  LineOutput output;
+  const auto transport = tracker["transport"].value_or(std::string{});
+  if (transport == "tcp-server") output.transport = LineTransport::TcpServer;
+  if (transport == "udp") output.transport = LineTransport::Udp;
+  if (transport == "serial") output.transport = LineTransport::Serial;
+  constexpr std::int64_t kMostPorts = 65535;
+  const auto port = tracker["port"].value_or(std::int64_t{0});
+  if (port > 0 && port <= kMostPorts && output.transport != LineTransport::Tcp)
+    output.port = static_cast<std::uint16_t>(port);
+  lines[tracker["name"].value_or(std::string{"tracker"})] = output;
+}
+
 Ports ports_of(const std::vector<ReplayedPlace>& places) {
   Ports ports;
   for (const ReplayedPlace& place : places) {
@@ -85,6 +103,10 @@ Ports ports_of(const std::vector<ReplayedPlace>& places) {
       case RecordedKind::MeasuringMachine:
         ports.cmm = place.port;
         break;
+      case RecordedKind::Lines:
+        ports.line_tracker = place.what;
+        if (place.port != 0) ports.tracker = place.port;
+        break;
     }
   }
 
@@ -101,6 +123,7 @@ Result<std::unique_ptr<Replay>> open(const ReplayOptions& options, HostTime now)
   setup.bus.speed = options.speed;
   ABBE_TRY(read_places(options, setup));
   read_serials(recorded_configuration(bytes), setup.serials);
+  read_transport(recorded_configuration(bytes), setup.lines);
   return Replay::open(*devices, setup, now);
 }
 

@@ -34,10 +34,10 @@ bool gone(const Socket& peer) {
 
 }  // namespace
 
-Result<LineTrackerServer> LineTrackerServer::open(const LineOutput& output,
-                                                  std::unique_ptr<LineTracker> tracker,
-                                                  HostTime now) {
-  LineTrackerServer server{output, std::move(tracker)};
+template <class Source>
+Result<LineServer<Source>> LineServer<Source>::open(const LineOutput& output,
+                                                    std::unique_ptr<Source> tracker, HostTime now) {
+  LineServer server{output, std::move(tracker)};
   server.port_ = output.port;
   if (output.transport == LineTransport::Tcp) {
     auto listener = listen_tcp(output.port);
@@ -53,7 +53,8 @@ Result<LineTrackerServer> LineTrackerServer::open(const LineOutput& output,
   return server;
 }
 
-std::string LineTrackerServer::where() const {
+template <class Source>
+std::string LineServer<Source>::where() const {
   switch (output_.transport) {
     case LineTransport::Tcp:
       return fmt::format("lines on 127.0.0.1:{}", port_);
@@ -67,7 +68,8 @@ std::string LineTrackerServer::where() const {
   return fmt::format("lines on {}", output_.link);
 }
 
-void LineTrackerServer::poll(HostTime now) {
+template <class Source>
+void LineServer<Source>::poll(HostTime now) {
   if (tracker_->take_hang_up()) lose(now);
   if (!receiver_) find_receiver(now);
   if (receiver_ && output_.transport != LineTransport::Udp && gone(receiver_)) lose(now);
@@ -75,7 +77,8 @@ void LineTrackerServer::poll(HostTime now) {
   send(now);
 }
 
-void LineTrackerServer::find_receiver(HostTime now) {
+template <class Source>
+void LineServer<Source>::find_receiver(HostTime now) {
   if (output_.transport == LineTransport::Tcp) {
     Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
@@ -88,7 +91,8 @@ void LineTrackerServer::find_receiver(HostTime now) {
   }
 }
 
-void LineTrackerServer::connect(HostTime now, int type) {
+template <class Source>
+void LineServer<Source>::connect(HostTime now, int type) {
   connect_at_ = now + kTryAgain;
   Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
   const auto at = loopback_address(output_.port);
@@ -98,14 +102,16 @@ void LineTrackerServer::connect(HostTime now, int type) {
   tracker_->connected(now);
 }
 
-void LineTrackerServer::lose(HostTime now) {
+template <class Source>
+void LineServer<Source>::lose(HostTime now) {
   receiver_.close();
   unsent_.clear();
   connect_at_ = now + kTryAgain;
   if (output_.transport != LineTransport::Serial) tracker_->disconnected();
 }
 
-void LineTrackerServer::send(HostTime now) {
+template <class Source>
+void LineServer<Source>::send(HostTime now) {
   const std::string text = tracker_->take_output();
   const auto bytes = std::as_bytes(std::span{text});
   switch (output_.transport) {
@@ -134,15 +140,20 @@ void LineTrackerServer::send(HostTime now) {
   if (unsent_.size() > kMostUnsentLines) lose(now);
 }
 
-HostTime LineTrackerServer::next_due() const {
+template <class Source>
+HostTime LineServer<Source>::next_due() const {
   const bool connects = !receiver_ && (output_.transport == LineTransport::TcpServer ||
                                        output_.transport == LineTransport::Udp);
   return connects ? std::min(connect_at_, tracker_->next_due()) : tracker_->next_due();
 }
 
-void LineTrackerServer::add_poll_fds(std::vector<pollfd>& fds) const {
+template <class Source>
+void LineServer<Source>::add_poll_fds(std::vector<pollfd>& fds) const {
   if (listener_ && !receiver_) fds.push_back({listener_.get(), POLLIN, 0});
   if (receiver_) add_client_fd(receiver_.get(), !unsent_.empty(), fds);
 }
+
+template class LineServer<LineTracker>;
+template class LineServer<RecordedLines>;
 
 }  // namespace abbe::sim

@@ -102,6 +102,21 @@ bool is_emscon(std::span<const std::byte> bytes) {
   return static_cast<std::size_t>(size) == bytes.size();
 }
 
+/// abbe sends nothing to a program that prints lines.
+bool are_lines(std::span<const RecordedBlock> blocks) {
+  constexpr auto is_text = [](std::byte b) {
+    return (b >= std::byte{' '} && b <= std::byte{'~'}) || b == std::byte{'\t'} ||
+           b == std::byte{'\r'} || b == std::byte{'\n'};
+  };
+  std::size_t text = 0, all = 0;
+  for (const RecordedBlock& block : blocks) {
+    if (block.to_device && !block.bytes.empty()) return false;
+    all += block.bytes.size();
+    text += static_cast<std::size_t>(std::ranges::count_if(block.bytes, is_text));
+  }
+  return 10 * text > 9 * all;  // garbage on a serial line is less than a tenth
+}
+
 std::optional<RecordedKind> kind_of_bytes(std::span<const std::byte> bytes) {
   if (is_emscon(bytes)) return RecordedKind::Tracker;
   if (is_usbip(bytes)) return RecordedKind::CounterCard;
@@ -117,6 +132,7 @@ std::optional<RecordedKind> kind_of_bytes(std::span<const std::byte> bytes) {
 }  // namespace
 
 RecordedKind kind_of(std::span<const RecordedBlock> blocks) {
+  if (are_lines(blocks)) return RecordedKind::Lines;
   for (const bool to_device : {true, false}) {
     for (const RecordedBlock& block : blocks) {
       if (block.to_device != to_device || block.bytes.empty()) continue;

@@ -122,6 +122,26 @@ class ReplayedTerminal final : public ReplayedDevice {
   TerminalServer server_;
 };
 
+class ReplayedLines final : public ReplayedDevice {
+ public:
+  ReplayedLines(std::string name, std::string link, LineServer<RecordedLines> server)
+      : name_(std::move(name)), link_(std::move(link)), server_(std::move(server)) {}
+  void poll(HostTime now) override { server_.poll(now); }
+  [[nodiscard]] HostTime next_due() const override { return server_.next_due(); }
+  void add_poll_fds(std::vector<pollfd>& fds) const override { server_.add_poll_fds(fds); }
+  [[nodiscard]] bool finished() const override { return server_.device().finished(); }
+  [[nodiscard]] ReplayedPlace place() const override {
+    return {name_, RecordedKind::Lines,
+            fmt::format("{} reads, {}", server_.device().reads(), server_.where()), server_.port(),
+            link_};
+  }
+
+ private:
+  std::string name_;
+  std::string link_;
+  LineServer<RecordedLines> server_;
+};
+
 class Maker {
  public:
   Maker(const ReplaySetup& setup, ReplayTimeline& timeline, bool has_tracker, HostTime now)
@@ -137,6 +157,8 @@ class Maker {
         return card(device);
       case RecordedKind::ModbusRtu:
         return terminal(device);
+      case RecordedKind::Lines:
+        return lines(device);
       case RecordedKind::ModbusTcp:
       case RecordedKind::MeasuringMachine:
         break;
@@ -178,12 +200,30 @@ class Maker {
     ABBE_TRY(server);
     return std::make_unique<ReplayedCard>(device.name, std::move(*server), recorded);
   }
-  [[nodiscard]] Made terminal(const RecordedDevice& device) const {
+  [[nodiscard]] std::string link_of(const RecordedDevice& device) const {
     const auto anywhere = std::filesystem::temp_directory_path() /
                           fmt::format("abbe-sim-{}-{}", ::getpid(), device.name);
+    return chosen(setup_.links, device.name, anywhere.string());
+  }
+  /// The recorded port if the lines go to a daemon: it receives there again.
+  [[nodiscard]] Made lines(const RecordedDevice& device) const {
+    LineOutput output = chosen(setup_.lines, device.name, LineOutput{});
+    if (output.transport == LineTransport::Serial)
+      output.link = link_of(device);
+    else if (output.transport == LineTransport::Tcp)
+      output.port = chosen(setup_.ports, device.name, setup_.tracker_port);
+    else
+      output.port = chosen(setup_.ports, device.name,
+                           setup_.tracker_port != 0 ? setup_.tracker_port : output.port);
+    auto server = LineServer<RecordedLines>::open(
+        output, std::make_unique<RecordedLines>(device, timeline_), now_);
+    ABBE_TRY(server);
+    return std::make_unique<ReplayedLines>(device.name, output.link, std::move(*server));
+  }
+  [[nodiscard]] Made terminal(const RecordedDevice& device) const {
     auto server = TerminalServer::open(
-        chosen(setup_.links, device.name, anywhere.string()),
-        std::make_unique<RecordedDialogue>(device, dialogue_wire(device.kind)), now_);
+        link_of(device), std::make_unique<RecordedDialogue>(device, dialogue_wire(device.kind)),
+        now_);
     ABBE_TRY(server);
     return std::make_unique<ReplayedTerminal>(device.name, std::move(*server));
   }
@@ -199,8 +239,9 @@ class Maker {
 Result<std::unique_ptr<Replay>> Replay::open(const std::vector<RecordedDevice>& devices,
                                              const ReplaySetup& setup, HostTime now) {
   std::unique_ptr<Replay> replay(new Replay);
-  const bool has_tracker =
-      std::ranges::any_of(devices, [](const auto& d) { return d.kind == RecordedKind::Tracker; });
+  const bool has_tracker = std::ranges::any_of(devices, [](const auto& d) {
+    return d.kind == RecordedKind::Tracker || d.kind == RecordedKind::Lines;
+  });
   const Maker maker(setup, replay->timeline_, has_tracker, now);
   for (const RecordedDevice& device : devices) {
     auto made = maker.make(device);

@@ -1,6 +1,6 @@
 #pragma once
-/// The program that prints the lines of a LineTracker, on its transport. Steppable: poll(now) never
-/// blocks and reads no clock. Not thread-safe.
+/// The program that prints the lines of a simulated or a recorded tracker, on its transport.
+/// Steppable: poll(now) never blocks and reads no clock. Not thread-safe.
 
 #include <poll.h>
 
@@ -12,6 +12,7 @@
 #include "abbe/sim/error.hpp"
 #include "abbe/sim/line_tracker.hpp"
 #include "abbe/sim/pseudo_terminal.hpp"
+#include "abbe/sim/recorded_lines.hpp"
 #include "abbe/sim/sim_clock.hpp"
 #include "abbe/sim/socket.hpp"
 
@@ -31,12 +32,13 @@ struct LineOutput {
   std::string link;        ///< Serial: path of the symbolic link to the receiver's end
 };
 
-class LineTrackerServer {
+/// `Source`: LineTracker or RecordedLines.
+template <class Source>
+class LineServer {
  public:
   /// Error Io: a port is in use, the pseudo terminal cannot be created.
-  [[nodiscard]] static Result<LineTrackerServer> open(const LineOutput& output,
-                                                      std::unique_ptr<LineTracker> tracker,
-                                                      HostTime now);
+  [[nodiscard]] static Result<LineServer> open(const LineOutput& output,
+                                               std::unique_ptr<Source> tracker, HostTime now);
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
@@ -46,11 +48,11 @@ class LineTrackerServer {
   [[nodiscard]] std::string where() const;
   /// Adds to `fds` the sockets that the caller must wait for, until next_due() at the latest.
   void add_poll_fds(std::vector<pollfd>& fds) const;
-  [[nodiscard]] LineTracker& device() { return *tracker_; }
-  [[nodiscard]] const LineTracker& device() const { return *tracker_; }
+  [[nodiscard]] Source& device() { return *tracker_; }
+  [[nodiscard]] const Source& device() const { return *tracker_; }
 
  private:
-  LineTrackerServer(LineOutput output, std::unique_ptr<LineTracker> tracker)
+  LineServer(LineOutput output, std::unique_ptr<Source> tracker)
       : output_(std::move(output)), tracker_(std::move(tracker)) {}
 
   void find_receiver(HostTime now);
@@ -59,7 +61,7 @@ class LineTrackerServer {
   void send(HostTime now);
 
   LineOutput output_;
-  std::unique_ptr<LineTracker> tracker_;
+  std::unique_ptr<Source> tracker_;
   std::uint16_t port_ = 0;
   Socket listener_;
   Socket receiver_;
@@ -67,5 +69,7 @@ class LineTrackerServer {
   HostTime connect_at_ = HostTime::min();
   std::vector<std::byte> unsent_;
 };
+
+using LineTrackerServer = LineServer<LineTracker>;
 
 }  // namespace abbe::sim

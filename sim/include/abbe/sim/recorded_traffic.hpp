@@ -36,6 +36,7 @@ enum class RecordedKind {
   ModbusTcp,
   ModbusRtu,
   MeasuringMachine,  ///< lines of I++ DME
+  Lines,             ///< tracker points as lines of text
 };
 
 struct RecordedDevice {
@@ -45,7 +46,7 @@ struct RecordedDevice {
 };
 
 /// Detects the protocol by the bytes that were sent to the device, else by the bytes that the
-/// device sent. Tracker if no protocol matches.
+/// device sent. Lines: text, and nothing was sent to the device. Tracker if no protocol matches.
 [[nodiscard]] RecordedKind kind_of(std::span<const RecordedBlock> blocks);
 
 /// The text of the configuration a recording was made with; empty if there is none.

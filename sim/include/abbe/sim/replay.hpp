@@ -1,6 +1,6 @@
 #pragma once
 /// Replays all devices of a recording, each on its own wire: emScon, CAN over UDP or SocketCAN,
-/// USB/IP, Modbus TCP and RTU, I++ DME. Steppable: poll(now) never blocks and reads no clock. Not
+/// USB/IP, Modbus TCP and RTU, I++ DME, lines of text. Steppable: poll(now) never blocks and reads no clock. Not
 /// thread-safe.
 
 #include <poll.h>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "abbe/sim/can_port.hpp"
+#include "abbe/sim/line_tracker_server.hpp"
 #include "abbe/sim/recorded_traffic.hpp"
 
 namespace abbe::sim {
@@ -22,6 +23,8 @@ struct ReplaySetup {
   /// path of the link to a pseudo terminal, by the name of the device
   std::map<std::string, std::string> links;
   std::map<std::string, std::string> serials;  ///< of counter cards, by the name of the device
+  /// How the lines of a tracker leave, by its name; default: it listens.
+  std::map<std::string, LineOutput> lines;
 };
 
 /// Where a device is served.

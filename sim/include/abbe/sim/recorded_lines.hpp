@@ -1,0 +1,49 @@
+#pragma once
+/// The lines of a tracker from a recording, sent again read by read with their original timing. The
+/// time runs from the first connection on. A connection that broke in the recording breaks again;
+/// the next one replays the next recorded one, and after the last one the recording begins again.
+/// Interface as LineTracker.
+
+#include <string>
+#include <vector>
+
+#include "abbe/sim/recorded_traffic.hpp"
+
+namespace abbe::sim {
+
+class RecordedLines {
+ public:
+  /// `timeline` must outlive it.
+  RecordedLines(const RecordedDevice& device, ReplayTimeline& timeline);
+
+  void connected(HostTime now);
+  void disconnected();
+  void advance(HostTime now);
+  [[nodiscard]] HostTime next_due() const;
+  [[nodiscard]] std::string take_output();
+  [[nodiscard]] bool take_hang_up();
+
+  /// The whole recording has been sent.
+  [[nodiscard]] bool finished() const { return finished_; }
+  /// With bytes.
+  [[nodiscard]] std::size_t reads() const;
+
+ private:
+  struct Connection {
+    HostTime began{};
+    std::vector<RecordedBlock> blocks;  ///< from the device; without bytes: the connection breaks
+  };
+  [[nodiscard]] const Connection& connection() const { return connections_[connection_]; }
+
+  ReplayTimeline& timeline_;
+  std::vector<Connection> connections_;
+  std::size_t connection_ = 0;
+  std::size_t next_ = 0;  ///< block of the connection
+  bool played_ = false;   ///< somebody has received before
+  bool connected_ = false;
+  bool finished_ = false;
+  bool hang_up_ = false;
+  std::string out_;
+};
+
+}  // namespace abbe::sim

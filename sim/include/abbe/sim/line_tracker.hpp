@@ -49,8 +49,8 @@ class LineTracker {
   /// True once after a fault that breaks the connection.
   [[nodiscard]] bool take_hang_up();
 
-  /// Faults: BeamBreak and ReflectorAway (no points), PrismError and SpeedExceeded (invalid status),
-  /// Stall, Mute, Disconnect, TrackerGarbage (a line that is no point).
+  /// Faults: BeamBreak and ReflectorAway (no points), PrismError and SpeedExceeded (invalid
+  /// status), Stall, Mute, Disconnect, TrackerGarbage (a line that is no point).
   void inject(const Fault& fault, HostTime now);
 
   [[nodiscard]] std::optional<HostTime> first_stream() const { return first_stream_; }

@@ -1,7 +1,7 @@
 #pragma once
 /// Replays all devices of a recording, each on its own wire: emScon, CAN over UDP or SocketCAN,
-/// USB/IP, Modbus TCP and RTU, I++ DME, lines of text. Steppable: poll(now) never blocks and reads no clock. Not
-/// thread-safe.
+/// USB/IP, Modbus TCP and RTU, I++ DME, lines of text. Steppable: poll(now) never blocks and reads
+/// no clock. Not thread-safe.
 
 #include <poll.h>
 

@@ -5,8 +5,8 @@
 /// on the heap.
 ///
 /// Raw blocks: a block FromDevice holds bytes as received; an empty one records a new connection.
-/// An empty block ToDevice records a lost connection. A recording may begin within a line: until the
-/// first new connection everything up to the first end of a line is discarded. The clock model
+/// An empty block ToDevice records a lost connection. A recording may begin within a line: until
+/// the first new connection everything up to the first end of a line is discarded. The clock model
 /// observes the last point of each read, so a replay joins the blocks of one read
 /// (RawBlock::continued) before it pushes them.
 

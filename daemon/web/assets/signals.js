@@ -8,7 +8,13 @@ import { listen, state } from "./server.js";
 const kKept = "abbe-signals";
 let sound = null;
 
-const on = () => localStorage.getItem(kKept) === "on";
+const on = () => {
+  try {
+    return localStorage.getItem(kKept) === "on";
+  } catch {
+    return false; // the browser allows this page no storage
+  }
+};
 
 /** Browsers let a page sound only after a click or a key: after a reload the first one switches it on. */
 const allow = () => {

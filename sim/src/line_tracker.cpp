@@ -117,11 +117,10 @@ void LineTracker::print_burst(HostTime at) {
         *grid_ + options_.separation * static_cast<std::chrono::nanoseconds::rep>(next_point_);
     if (t > until) return;
     const HostTime measured = host_time(options_.model, power_on_, t);
-    if (measured >= no_beam_from_ && measured < no_beam_until_) continue;
+    if (beam_broken_.holds(measured)) continue;
     const TrackerView view = observe(options_.model, machine_, measured, next_point_);
     if (!view.has_target || at < mute_until_) continue;
-    const bool faulted = measured >= invalid_from_ && measured < invalid_until_;
-    const bool valid = !faulted && view.speed != BeamSpeed::Exceeded;
+    const bool valid = !invalid_.holds(measured) && view.speed != BeamSpeed::Exceeded;
     out_ += print_line(options_.format, view.p_tracker_m, t, valid);
     ++points_sent_;
   }
@@ -142,13 +141,11 @@ void LineTracker::inject(const Fault& fault, HostTime now) {
   switch (fault.kind) {
     case FaultKind::BeamBreak:
     case FaultKind::ReflectorAway:
-      no_beam_from_ = now;
-      no_beam_until_ = until;
+      beam_broken_ = {now, until};
       return;
     case FaultKind::SpeedExceeded:
     case FaultKind::PrismError:
-      invalid_from_ = now;
-      invalid_until_ = until;
+      invalid_ = {now, until};
       return;
     case FaultKind::Stall:
       stall_until_ = until;

@@ -116,14 +116,14 @@ void LineServer<Source>::send(HostTime now) {
   const auto bytes = std::as_bytes(std::span{text});
   switch (output_.transport) {
     case LineTransport::Serial:
-      // What nobody reads is lost, as on a real line.
+      // Lines that are not read are lost, as on a real line.
       if (!text.empty()) static_cast<void>(::write(terminal_.fd(), text.data(), text.size()) < 0);
       return;
     case LineTransport::Udp:
       for (std::string_view rest = text; receiver_ && !rest.empty();) {
         const std::size_t end =
             rest.size() <= kDatagram ? rest.size() : rest.rfind('\n', kDatagram - 1) + 1;
-        // Nobody has bound the port: the kernel reports it with the next datagram.
+        // No program has bound the port: the kernel reports it with the next datagram.
         if (::send(receiver_.get(), rest.data(), end, MSG_DONTWAIT | MSG_NOSIGNAL) < 0 &&
             errno == ECONNREFUSED)
           return lose(now);

@@ -45,7 +45,7 @@ class FaultyLineSender {
     }
   }
   void serve() { wire_.serve(); }
-  /// What was measured while nobody was connected is not sent later.
+  /// What was measured while no receiver was connected is not sent later.
   void send_valid() {
     const auto text = points_.until(time_.now());
     if (holding_)

@@ -1,7 +1,7 @@
 #pragma once
 /// A tracker whose measuring program prints its points as lines of text, without its transport: a
-/// time in, text out. It measures while somebody receives, and prints a burst every 332 ms (5 to
-/// 95 %: 324 to 344), as the programs of the manufacturers do. Not thread-safe.
+/// time in, text out. It measures while a receiver is connected, and prints a burst every 332 ms (5
+/// to 95 %: 324 to 344), as the programs of the manufacturers do. Not thread-safe.
 ///
 /// The grid of points and their noise are those of TrackerDevice: the n-th point of a run has the
 /// same noise.
@@ -38,7 +38,7 @@ class LineTracker {
   /// The tracker is switched on at `now`. `machine` must outlive it.
   LineTracker(const LineTrackerOptions& options, const VirtualMachine& machine, HostTime now);
 
-  /// Somebody receives from now on, or nobody does any more: what is measured meanwhile is lost.
+  /// A receiver is connected from now on, or none any more: what is measured meanwhile is lost.
   void connected(HostTime now);
   void disconnected();
   /// Measures and prints everything that is due until `now`.
@@ -70,10 +70,7 @@ class LineTracker {
   std::optional<HostTime> first_stream_;
   std::string out_;
   bool hang_up_ = false;
-  HostTime no_beam_from_ = HostTime::max();
-  HostTime no_beam_until_ = HostTime::max();
-  HostTime invalid_from_ = HostTime::max();
-  HostTime invalid_until_ = HostTime::max();
+  MeasuringTime beam_broken_, invalid_;
   HostTime mute_until_ = HostTime::min();
   HostTime stall_until_ = HostTime::min();
 };

@@ -23,7 +23,7 @@ enum class LineTransport {
   Tcp,        ///< listens on a port of 127.0.0.1
   TcpServer,  ///< connects to a port of 127.0.0.1
   Udp,        ///< sends datagrams to a port of 127.0.0.1
-  Serial,     ///< a pseudo terminal; nobody can see whether it is read
+  Serial,     ///< a pseudo terminal; whether it is read cannot be seen
 };
 
 struct LineOutput {

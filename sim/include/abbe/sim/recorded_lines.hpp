@@ -39,7 +39,7 @@ class RecordedLines {
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
   std::size_t next_ = 0;  ///< block of the connection
-  bool played_ = false;   ///< somebody has received before
+  bool played_ = false;   ///< a receiver was connected before
   bool connected_ = false;
   bool finished_ = false;
   bool hang_up_ = false;

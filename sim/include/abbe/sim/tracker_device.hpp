@@ -84,14 +84,6 @@ class TrackerDevice {
     std::uint64_t points_left;
   };
 
-  /// An interval of the times at which points are measured, not of the times at which they are
-  /// sent.
-  struct Window {
-    HostTime from = HostTime::max();
-    HostTime until = HostTime::max();
-    [[nodiscard]] bool holds(HostTime t) const { return t >= from && t < until; }
-  };
-
   // Commands.
   void on_packet(std::span<const std::byte> packet, HostTime now);
   void carry_out(const emscon::Request& request, HostTime at);
@@ -178,10 +170,10 @@ class TrackerDevice {
   double announced_temperature_C_;
   double weather_step_K_ = 0.0;
   std::optional<HostTime> beam_back_;
-  Window beam_broken_;
-  Window speed_fault_;
-  Window prism_fault_;
-  Window reflector_away_;
+  MeasuringTime beam_broken_;
+  MeasuringTime speed_fault_;
+  MeasuringTime prism_fault_;
+  MeasuringTime reflector_away_;
   HostTime mute_until_ = HostTime::min();
   HostTime busy_until_ = HostTime::min();
   std::optional<HostTime> stall_until_;

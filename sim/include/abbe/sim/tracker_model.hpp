@@ -48,6 +48,13 @@ struct TrackerView {
 
 [[nodiscard]] Eigen::Matrix3d R_machine_tracker(const TrackerModel& model);
 
+/// An interval of the times at which points are measured, not of the times at which they are sent.
+struct MeasuringTime {
+  HostTime from = HostTime::max();
+  HostTime until = HostTime::max();
+  [[nodiscard]] bool holds(HostTime t) const { return t >= from && t < until; }
+};
+
 /// The measured position of the target at time `at`, that of the machine or of a nest; `index`
 /// selects the random numbers of the noise.
 [[nodiscard]] TrackerView observe(const TrackerModel& model, const VirtualMachine& machine,

@@ -158,18 +158,21 @@ constexpr std::array<std::pair<double, double>, 3> kExampleTravel_m{
     {{-0.3, 0.3}, {-0.25, 0.25}, {-0.4, 0.0}}};
 constexpr std::array kExampleTarget_m{0.02, -0.015, -0.12};
 
+/// Equal but for the conversion from mm.
+bool same_length(double a_m, double b_m) {
+  return std::abs(a_m - b_m) < 1e-9;
+}
+
 bool has_example_travel(const MachineConfig& machine) {
-  return std::ranges::equal(machine.axes, kExampleTravel_m,
-                            [](const auto& axis, const auto& travel) {
-                              return std::abs(axis.min - travel.first) < 1e-9 &&
-                                     std::abs(axis.max - travel.second) < 1e-9;
-                            });
+  return std::ranges::equal(
+      machine.axes, kExampleTravel_m, [](const auto& axis, const auto& travel) {
+        return same_length(axis.min, travel.first) && same_length(axis.max, travel.second);
+      });
 }
 
 bool has_example_target(const MachineConfig& machine) {
   return machine.target_given &&
-         std::ranges::equal(machine.target_offset_m, kExampleTarget_m,
-                            [](double own, double given) { return std::abs(own - given) < 1e-9; });
+         std::ranges::equal(machine.target_offset_m, kExampleTarget_m, same_length);
 }
 
 std::vector<std::string> left_of_the_example(const toml::table& table,

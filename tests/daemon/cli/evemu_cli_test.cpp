@@ -275,8 +275,9 @@ TEST_F(EvemuCli, IdentifiesFromARecordingAsFromTheTouchesInIt) {
   const auto inputs = nlohmann::json::parse(text_of(folder_ / "out/model.json"))["inputs"].dump();
   EXPECT_THAT(inputs,
               AllOf(HasSubstr("run.mcap"), HasSubstr("calibrator.toml"), HasSubstr("touches")));
+  // The name that it had while it was written.
   const auto other =
-      abbe("identify evemu --recording run.mcap --order 3 --estimator ols --json -o other");
+      abbe("identify evemu --recording run.mcap.part --order 3 --estimator ols --json -o other");
   ASSERT_EQ(other.exit, kRefused) << other.err;
   EXPECT_EQ(nlohmann::json::parse(other.out)["unknowns"], 45);
 }

@@ -55,6 +55,19 @@ TEST(CalibrationSession, ReportsWhenTheMachineMayDriveOff) {
   EXPECT_THAT(reasons_of(session), ElementsAre("driving the path"));
 }
 
+TEST(CalibrationSession, ReportsThatTheRunBeganBeforeReady) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.unsettle_clock(true);
+  drive.stand(kPath[0], 1s);
+  EXPECT_FALSE(session.status().start->ready);
+  drive.move(kPath[1]);
+  EXPECT_EQ(session.status().state, SessionState::Acquiring);
+  EXPECT_THAT(reasons_of(session).back(),
+              StartsWith("driving the path, begun before READY: the clock of the tracker"));
+}
+
 TEST(CalibrationSession, ReportsAtOnceThatTheStartWasMissed) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));

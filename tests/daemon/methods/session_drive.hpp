@@ -36,6 +36,7 @@ class SessionDrive {
   /// Offset of the tracker's clock from host time; 500 s at first.
   void set_device_clock(std::chrono::nanoseconds ahead) { device_ahead_ = ahead; }
   void lose_axes() { axes_known_ = false; }
+  void unsettle_clock(bool unsettled) { unsettled_ = unsettled; }  ///< of the tracker
   void set_environment(const protocol::EnvironmentSample& e) { environment_ = e; }
   [[nodiscard]] protocol::HostTime now() const { return now_; }
 
@@ -51,6 +52,9 @@ class SessionDrive {
     s.has_tracker_point = true;
     s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch() + device_ahead_};
     s.tracker_point.p_tracker_m = q_;
+    if (unsettled_)
+      s.tracker_point.head.flags |=
+          static_cast<protocol::SampleFlags>(protocol::SampleFlag::ClockUnsettled);
     s.has_environment = environment_.has_value();
     if (environment_) s.environment = *environment_;
     session_.take(s);
@@ -62,7 +66,7 @@ class SessionDrive {
   double speed_m_per_s_ = 0.0;
   protocol::HostTime now_{std::chrono::seconds{10}};
   std::chrono::nanoseconds device_ahead_ = std::chrono::seconds{500};
-  bool axes_known_ = true;
+  bool axes_known_ = true, unsettled_ = false;
   std::optional<protocol::EnvironmentSample> environment_;
 };
 

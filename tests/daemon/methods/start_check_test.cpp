@@ -115,6 +115,9 @@ TEST_F(AStart, IsNotMissedByAMachineThatComesToItOrJogsElsewhere) {
   take(milliseconds{100}, kFirst);
   take(milliseconds{1000}, kFirst, {0, 0.05, 0});  // away from it, not along the first leg
   EXPECT_FALSE(check_.missed());
+  take(milliseconds{1000}, {0.15, 0.02, 0}, {0, -0.02, 0});  // and back onto the first leg
+  take(milliseconds{500}, {0.15, 0, 0}, {-0.05, 0, 0});
+  EXPECT_FALSE(check_.missed());
 }
 
 TEST_F(AStart, IsNotReadyWhenTheTrackerFallsSilent) {

@@ -9,8 +9,8 @@
 
 namespace abbe::daemon {
 
-/// Before the work whose result becomes `pdf`: Io if no converter is installed, or if there is no
-/// folder for the file.
+/// Call it before a result is stored whose report becomes `pdf`: Io if no converter is installed,
+/// or if there is no folder for the file.
 [[nodiscard]] Result<void> check_pdf(const std::filesystem::path& pdf);
 
 /// Writes `pdf`. Io if no converter is installed, or if it fails or takes longer than three

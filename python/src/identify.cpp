@@ -113,6 +113,7 @@ py::dict verify(const daemon::VerifyArguments& arguments, bool as_list) {
   else
     add_effect(out, v.models.front());
   out["points_off"] = v.points_off;
+  out["likely_mistakes"] = v.likely_mistakes;
   out["cut_short"] = v.cut_short;
   return out;
 }

@@ -337,6 +337,33 @@ TEST(Verification, NamesTheOppositeOrderAlsoOfRepeatedShots) {
   EXPECT_THAT(wrong.error().text, testing::HasSubstr("the measured points in the opposite order"));
 }
 
+/// V of the model tells mirror images and rotations of the readings from each other.
+TEST(Verification, NamesTheAxesOfTheReadingsThatTheModelShows) {
+  const auto V = tests::evemu::table3_machine();
+  const ErrorsAt errors_at = [&](const Vector3& q_m) { return std::optional(Vector3(V(q_m))); };
+  const auto points = measured(V, measured_box());
+  EXPECT_THAT(likely_mistakes(points, Frame::BestFit, errors_at), testing::IsEmpty());
+
+  auto swapped = points, turned = points;
+  for (auto& p : swapped) std::swap(p.reading_m.x(), p.reading_m.y());
+  for (auto& p : turned) p.reading_m.head<2>() *= -1.0;
+  EXPECT_THAT(observe(swapped, Frame::BestFit, errors_at).error().text,
+              testing::EndsWith("; they fit with X and Y swapped (readings)"));
+  ASSERT_TRUE(observe(turned, Frame::BestFit, errors_at));
+  EXPECT_THAT(likely_mistakes(turned, Frame::BestFit, errors_at),
+              testing::ElementsAre(testing::StartsWith("X and Y reversed (readings): ")));
+}
+
+/// All ranges contain the radius of the reflector.
+TEST(Verification, NamesAConstantOfTheRanges) {
+  const auto V = tests::evemu::table3_machine();
+  const ErrorsAt errors_at = [&](const Vector3& q_m) { return std::optional(Vector3(V(q_m))); };
+  auto points = measured(V, measured_box());
+  for (auto& p : points) p.measured_m += 19.05e-3 * p.measured_m.normalized();
+  EXPECT_THAT(likely_mistakes(points, Frame::BestFit, errors_at),
+              testing::ElementsAre(testing::StartsWith("ranges shorter by 19.05 mm")));
+}
+
 TEST(Verification, RefusesMixedUpRowsAndMirroredFrames) {
   auto points = measured(tests::evemu::table3_machine(), measured_box());
   auto mirrored = points;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/direct/convention.hpp"
@@ -17,9 +18,7 @@ namespace {
 constexpr double kRounding = 1e-12;  // m or rad
 constexpr double kNeverFits = std::numeric_limits<double>::infinity();
 constexpr std::size_t kLeastDof = 3;
-constexpr double kCloser = 1.0 / 3.0;  // of the rms difference of the values as given
-constexpr double kAsGoodAsBest = 1.5;  // times the best rms difference
-constexpr double kMostOutside = 0.3;   // share of positions that a correction may lose
+constexpr double kMostOutside = 0.3;  // share of positions that a correction may lose
 
 /// The measured values after a correction.
 struct CorrectedValues {
@@ -107,6 +106,7 @@ class CauseSearch {
   [[nodiscard]] std::vector<CorrectedValues> corrections() const {
     std::vector<CorrectedValues> all;
     add_reversals(all);
+    add_units_of_positions(all);
     add_factor(all);
     add_slope(all);
     add_shift(all);
@@ -140,6 +140,17 @@ class CauseSearch {
         c.text = "with the positions counted from the other end" + also;
         all.push_back(c);
       }
+    }
+  }
+
+  void add_units_of_positions(std::vector<CorrectedValues>& all) const {
+    for (const UnitMistake& mistake : unit_mistakes()) {
+      CorrectedValues c = given_;
+      for (double& p : c.positions_m) {
+        p *= mistake.factor;
+      }
+      c.text = "with the positions as " + mistake.text;
+      all.push_back(c);
     }
   }
 
@@ -280,7 +291,7 @@ std::vector<std::string> likely_causes(const ModelCurve& curve, std::span<const 
   const char* unit = is_rotation(curve.motion().motion) ? " urad" : " um";
   std::vector<std::string> causes;
   for (const std::size_t i : order) {
-    if (left[i] <= kCloser * given && left[i] <= kAsGoodAsBest * left[order.front()]) {
+    if (left[i] <= kFarBetter * given && left[i] <= kAsGoodAsBest * left[order.front()]) {
       const bool fits = test && search.fits(corrections[i], *test);
       causes.push_back(message(fits ? "fits " : "closer ", corrections[i].text, ": ",
                                three_digits(kUmPerM * left[i]), unit, " rms left of ",

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/calib/internal/evemu/solve/artefact_rows.hpp"

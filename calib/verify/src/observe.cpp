@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/model/model_comparison.hpp"
 #include "abbe/result/try.hpp"
 #include "extent.hpp"
+#include "points_with_mistakes.hpp"
 
 namespace abbe::calib::verify {
 namespace {
@@ -22,54 +22,8 @@ Result<void> check_finite(std::span<const MeasuredPoint> points) {
   return {};
 }
 
-/// Text "; they fit with ..." that names the mistakes after whose correction the points fit the
-/// readings: a reflection, another unit, reversed order of the rows. Empty if no tested correction
-/// makes them fit. It tests the shots: means of places mix rows that are in the wrong order.
-std::string fits_with(std::span<const MeasuredPoint> points, double most_rms_m) {
-  const auto fits = [&](const Matrix3& M, bool backwards) {
-    std::vector<Vector3> from, readings_m;
-    for (const MeasuredPoint& p : points) {
-      from.emplace_back(M * p.measured_m);
-      readings_m.push_back(p.reading_m);
-    }
-    if (backwards) {
-      std::reverse(from.begin(), from.end());
-    }
-    const auto T = fit_rigid(from, readings_m);
-    std::vector<Vector3> left;
-    for (std::size_t i = 0; T && i < from.size(); ++i) {
-      left.emplace_back(*T * from[i] - readings_m[i]);
-    }
-    return T && vector_statistics(left).rms_m <= most_rms_m;
-  };
-
-  std::vector<std::string> texts;
-  if (fits(Matrix3::Identity(), false)) {
-    texts.emplace_back("a frame that is fitted to the readings (--frame fit)");
-  }
-
-  if (fits(Vector3(-1.0, 1.0, 1.0).asDiagonal(), false)) {
-    texts.emplace_back("one axis reversed or two axes swapped (a left-handed frame)");
-  }
-
-  if (fits(Matrix3::Identity(), true)) {
-    texts.emplace_back("the measured points in the opposite order");
-  }
-
-  for (const UnitMistake& mistake : unit_mistakes()) {
-    for (const auto& [factor, of] :
-         {std::pair{mistake.factor, "measured points"}, {1.0 / mistake.factor, "readings"}}) {
-      if (fits(factor * Matrix3::Identity(), false)) {
-        texts.push_back(message(mistake.text, " (", of, ")"));
-      }
-    }
-  }
-
-  return texts.empty() ? "" : "; they fit with " + or_list(texts);
-}
-
 Result<void> check_lack_of_fit(const Observations& o, std::span<const MeasuredPoint> points,
-                               const Extent& extent) {
+                               const Extent& extent, const ErrorsAt& errors_at) {
   Vector3 mean = Vector3::Zero();
   for (const Vector3& v : o.V_m) {
     mean += v / static_cast<double>(o.V_m.size());
@@ -88,7 +42,7 @@ Result<void> check_lack_of_fit(const Observations& o, std::span<const MeasuredPo
                            o.frame == Frame::BestFit ? " after the best rigid motion"
                                                      : " in the machine's axes",
                            ": rows in the wrong order, another unit, or a left-handed frame",
-                           fits_with(points, kMostLackOfFit * extent.diagonal_m())));
+                           mistakes_that_fit(points, o.frame, errors_at)));
   }
 
   return {};
@@ -164,7 +118,8 @@ std::size_t Observations::shot_count() const noexcept {
   return count;
 }
 
-Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame) {
+Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame,
+                             const ErrorsAt& errors_at) {
   ABBE_TRY(check_finite(points));
 
   Observations o;
@@ -190,7 +145,7 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
   }
   o.repeatability_m = repeatability_m(points, o);
 
-  ABBE_TRY(check_lack_of_fit(o, points, *extent));
+  ABBE_TRY(check_lack_of_fit(o, points, *extent, errors_at));
 
   return o;
 }

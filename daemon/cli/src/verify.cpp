@@ -90,6 +90,7 @@ json one_json(const Verification& v) {
   object["interpolation_rms_um"] = kUmPerM * c.interpolation_rms_m;
   object["cut_short"] = v.cut_short;
   object["points_off"] = v.points_off;
+  object["likely_mistakes"] = v.likely_mistakes;
   if (const auto why = why_no_ratio(c)) {
     object["R_not_given"] = *why;
   } else {
@@ -130,6 +131,8 @@ void print_one(const Verification& v) {
   const auto& c = v.comparison();
   const auto& document = v.models.front().model.document;
   fmt::print("verdict     {}\n", verdict_text(c));
+  for (const auto& line : v.likely_mistakes)
+    fmt::print("mistake?    the points fit far better with {}\n", line);
   for (const auto& line : v.points_off) fmt::print("one point   {}\n", line);
   fmt::print("model       {}  (machine \"{}\", {})\n", model_id(document),
              printable_line(document.machine), document.method);
@@ -138,6 +141,8 @@ void print_one(const Verification& v) {
   const calib::Vector3 tool_mm = kMmPerM * v.models.front().tool_m;
   fmt::print("points      {}; {} of these places where the model is valid\n",
              shots_text(v.observations), v.inside);
+  if (v.repeated > 0)
+    fmt::print("            {} rows repeat another row in every digit: counted once\n", v.repeated);
   fmt::print(
       "tool        the points are taken as those of the tool offset ({:g} {:g} {:g}) mm "
       "(--tool-mm)\n",
@@ -175,6 +180,7 @@ json verification_json(const Verification& v) {
   json object = v.models.size() > 1 ? several_json(v) : one_json(v);
   object["points"] = v.observations.shot_count();
   object["places"] = v.observations.shots.size();
+  object["repeated"] = v.repeated;
   object["repeatability_um"] = figure_or_null(kUmPerM, v.observations.repeatability_m);
   return object;
 }

@@ -9,7 +9,7 @@
 
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
 

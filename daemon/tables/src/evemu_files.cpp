@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/json_text.hpp"
@@ -96,8 +98,18 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
   check_rows(*parsed, 1, "touches");
   auto& [source, table, faults] = *parsed;
   TouchesFile out{source, {}, {}};
+  std::map<std::array<double, 6>, std::size_t> lines;
 
   for (std::size_t row = 0; row < table.rows(); ++row) {
+    std::array<double, 6> cells{};
+    for (std::size_t column = 0; column < cells.size(); ++column)
+      cells[column] = table.at(row, column);
+    const auto [first, is_new] = lines.emplace(cells, table.line(row));
+    if (!is_new && table.sound(row))
+      faults.add_kind("repeated", table.line(row), 1, "",
+                      fmt::format("repeats line {} in every digit: the same touch twice; delete "
+                                  "one of the rows",
+                                  first->second));
     out.lines.push_back(table.line(row));
     out.touches.push_back({.position = number_at(table, row, 0, "position", faults),
                            .feature = table.at(row, 1) < 0.5 ? calib::evemu::Feature::Ball

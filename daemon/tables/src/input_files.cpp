@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/text_file.hpp"
@@ -62,19 +64,59 @@ void check_path(ParsedTable& parsed) {
 // Variants of the file format.
 constexpr std::size_t kSpherical = 0, kTrackerFrame = 1, kUnstatedFrame = 2;
 
+struct Limits {
+  double least = 0.0, most = 0.0;
+  [[nodiscard]] bool contain(const Limits& other) const {
+    return least <= other.least && other.most <= most;
+  }
+};
+
+/// The smallest and the largest value of a column.
+Limits limits_of(const NumberTable& table, std::size_t column) {
+  Limits found{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!table.sound(row)) continue;
+    found.least = std::min(found.least, table.at(row, column));
+    found.most = std::max(found.most, table.at(row, column));
+  }
+  return found;
+}
+
+/// "; they fit as degrees": the meaning with which all angles of a column are possible. Empty if
+/// none is.
+std::string azimuths_fit_as(const Limits& found) {
+  if (Limits{-360.0, 360.0}.contain(found)) return "; they fit as degrees, or as gon";
+  if (Limits{-400.0, 400.0}.contain(found)) return "; they fit as gon";
+  return {};
+}
+
+std::string elevations_fit_as(const Limits& found, bool other_unit) {
+  constexpr Limits kZenith{0.0, std::numbers::pi};
+  if (!other_unit && kZenith.contain(found)) return "; they fit as zenith angles";
+  if (Limits{-90.0, 90.0}.contain(found)) return "; they fit as degrees, or as gon";
+  if (Limits{0.0, 180.0}.contain(found)) return "; they fit as zenith angles in degrees";
+  if (Limits{-100.0, 100.0}.contain(found)) return "; they fit as gon";
+  if (Limits{0.0, 200.0}.contain(found)) return "; they fit as zenith angles in gon";
+  return {};
+}
+
 void check_spherical(ParsedTable& parsed) {
+  constexpr std::size_t kAzimuth = 2, kElevation = 3;
   const auto& table = parsed.table;
   if (table.form() != kSpherical) return;
+  const Limits azimuth = limits_of(table, kAzimuth);
+  const bool other_unit =
+      std::max(std::abs(azimuth.least), std::abs(azimuth.most)) > 2.0 * std::numbers::pi;
+  const std::string azimuths = azimuths_fit_as(azimuth),
+                    elevations = elevations_fit_as(limits_of(table, kElevation), other_unit);
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (!table.sound(row)) continue;
     if (table.at(row, 1) <= 0.0)
       parsed.faults.add(table.line(row), 1, "range_mm", "must be positive");
-    if (std::abs(table.at(row, 2)) > 2.0 * std::numbers::pi)
-      parsed.faults.add(table.line(row), 1, "azimuth_rad",
-                        "more than one revolution (is the unit degrees?)");
-    if (std::abs(table.at(row, 3)) > std::numbers::pi / 2.0)
-      parsed.faults.add(table.line(row), 1, "elevation_rad",
-                        "beyond the vertical (is the unit degrees?)");
+    if (std::abs(table.at(row, kAzimuth)) > 2.0 * std::numbers::pi)
+      parsed.faults.add(table.line(row), 1, "azimuth_rad", "more than one revolution" + azimuths);
+    if (std::abs(table.at(row, kElevation)) > std::numbers::pi / 2.0)
+      parsed.faults.add(table.line(row), 1, "elevation_rad", "beyond the vertical" + elevations);
   }
 }
 
@@ -247,7 +289,8 @@ Result<VerificationFile> read_verification_csv(const std::filesystem::path& file
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   const auto& table = parsed->table;
-  VerificationFile out{parsed->source, {}, {}};
+  VerificationFile out{parsed->source, {}, {}, 0};
+  std::set<std::array<double, 6>> seen;
 
   const auto vector_m = [&](std::size_t row, std::size_t first) {
     const auto p = position_m(table, row, first);
@@ -255,6 +298,13 @@ Result<VerificationFile> read_verification_csv(const std::filesystem::path& file
   };
 
   for (std::size_t row = 0; row < table.rows(); ++row) {
+    std::array<double, 6> cells{};
+    for (std::size_t column = 0; column < cells.size(); ++column)
+      cells[column] = table.at(row, column);
+    if (!seen.insert(cells).second) {
+      ++out.repeated;
+      continue;
+    }
     out.points.push_back({vector_m(row, 0), vector_m(row, 3)});
     out.lines.push_back(table.line(row));
   }

@@ -6,7 +6,7 @@
 
 #include "abbe/base/faults.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/config/calibration_input.hpp"
 #include "abbe/result/try.hpp"
 

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/evemu_files.hpp"
@@ -13,6 +15,28 @@
 
 namespace abbe::daemon {
 namespace {
+
+/// BadInput if the balls have a size that no ball of an artefact has, but would have it with the
+/// touches in another unit.
+Result<void> check_size_of_balls(const std::string& file, const calib::evemu::Calibrator& found) {
+  constexpr double kSmallest_m = 1e-3, kLargest_m = 0.1;
+  const auto all_usual = [&](double factor) {
+    return std::ranges::all_of(found.balls, [&](const auto& ball) {
+      const double radius_m = factor * (ball.radius_m + found.tip_radius_m);
+      return radius_m >= kSmallest_m && radius_m <= kLargest_m;
+    });
+  };
+  if (all_usual(1.0)) return {};
+  for (const calib::UnitMistake& unit : calib::unit_mistakes())
+    if (all_usual(unit.factor))
+      return fail(
+          ErrorCode::BadInput,
+          fmt::format("{}: ball 1 has radius {:.4g} mm (without the tip), usual are {:g} to "
+                      "{:g} mm; they fit with {}",
+                      file, kMmPerM * found.balls.front().radius_m, kMmPerM * kSmallest_m,
+                      kMmPerM * kLargest_m, unit.text));
+  return {};
+}
 
 Result<IdentifiedArtefact> precalibrated_artefact(const IdentifyArtefactArguments& arguments) {
   const auto outward_1 = parse_mm("--outward-1", arguments.outward_1),
@@ -34,6 +58,7 @@ Result<IdentifiedArtefact> precalibrated_artefact(const IdentifyArtefactArgument
                                                 arguments.tip_radius_mm / kMmPerM,
                                                 {*outward_1, *outward_2}, u_touch_m);
   if (!calibrator) return tl::make_unexpected(error_of(calibrator.error()));
+  ABBE_TRY(check_size_of_balls(arguments.touches, *calibrator));
   if (arguments.machine_tip_radius_mm >= 0.0)
     calibrator->tip_radius_m = arguments.machine_tip_radius_mm / kMmPerM;
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "abbe/base/text_file.hpp"
+#include "abbe/calib/mfb/observe/reading_mistakes.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/gauge_file.hpp"
@@ -25,7 +26,11 @@ Result<IdentifiedBar> calibrated_bar(const IdentifyBarArguments& arguments) {
   ABBE_TRY(gauge);
 
   auto found = calib::mfb::calibrate_bar(bar->bar, plan->plan, points->passes, gauge->gauge);
-  if (!found) return tl::make_unexpected(error_of(found.error()));
+  if (!found) {
+    Error error = error_of(found.error());
+    error.text += calib::mfb::corrections_to_plan(bar->bar, plan->plan, points->passes);
+    return tl::make_unexpected(std::move(error));
+  }
   return IdentifiedBar{std::move(*found),
                        {bar->source, plan->source, points->source, gauge->source},
                        plan->plan.measurements.size() / 2};

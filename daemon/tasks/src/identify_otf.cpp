@@ -14,6 +14,7 @@
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/document.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/methods/otf/length_unit.hpp"
 #include "abbe/methods/otf/path_readings.hpp"
 #include "abbe/methods/otf/time_unit.hpp"
 #include "abbe/result/try.hpp"
@@ -110,12 +111,32 @@ struct Files : MachineAndPath {
   std::optional<EncoderFile> encoder = {};
 };
 
+/// BadInput for a file with about one row per position in standstill mode: its rows are means,
+/// which are not read in any frame.
+Result<void> check_no_means(const IdentifyOtfArguments& arguments, const TrackerFile& tracker,
+                            const MachineAndPath& read) {
+  constexpr std::size_t kLeastPerPosition = 2;
+  const bool standstills = arguments.mode.empty() ? read.config.otf.mode == OtfMode::Standstill
+                                                  : arguments.mode == "standstill";
+  const std::size_t rows = tracker.points.size(), positions = read.path.vertices_m.size();
+  if (!standstills || rows >= kLeastPerPosition * positions) return {};
+  return fail(ErrorCode::BadInput,
+              fmt::format("{}: {} rows for the {} positions of {}: one row for each is the mean of "
+                          "a standstill. Means are not read, because they do not show their "
+                          "scatter; export every measurement, at least 3 in 0.1 s of each stop",
+                          arguments.tracker, rows, positions, read.path.source.name));
+}
+
 Result<Files> read_files(const IdentifyOtfArguments& arguments, const Progress& progress) {
   auto read = read_machine_and_path(arguments);
   ABBE_TRY(read);
   auto tracker = read_tracker_csv(
       arguments.tracker, [&](double fraction) { progress.show("reading the tracker", fraction); });
   ABBE_TRY(tracker);
+  ABBE_TRY(check_no_means(arguments, *tracker, *read));
+  const auto machine = otf_machine(read->config.machine);
+  ABBE_TRY(machine);
+  ABBE_TRY(check_length_unit(arguments.tracker, *tracker, read->path, machine->nodes));
   ABBE_TRY(place_tracker(*tracker, arguments.tracker_centre_m(0), arguments.tracker,
                          arguments.centre_option));
   ABBE_TRY(check_time_unit(arguments.tracker, *tracker, read->path));

@@ -10,6 +10,7 @@
 #include "abbe/config/calibration_input.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/methods/otf/length_unit.hpp"
 #include "abbe/methods/otf/time_unit.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/identified_model.hpp"
@@ -66,6 +67,9 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, const Progre
       progress.show(fmt::format("reading {}", target->second), fraction);
     });
     ABBE_TRY(tracker);
+    const auto machine = otf_machine(all.config.machine);
+    ABBE_TRY(machine);
+    ABBE_TRY(check_length_unit(target->second, *tracker, all.path, machine->nodes));
     ABBE_TRY(check_time_unit(target->second, *tracker, all.path));
     ABBE_TRY(place_tracker(*tracker, arguments.tracker_centre_m(all.runs.size()), target->second,
                            arguments.centre_option));

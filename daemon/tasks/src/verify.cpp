@@ -92,6 +92,16 @@ Result<std::vector<ModelAtPoints>> models_of(const VerifyArguments& arguments) {
   return models;
 }
 
+/// V of a model where it is valid; `one` must outlive it.
+verify::ErrorsAt errors_of(const ModelAtPoints& one) {
+  return [&one](const calib::Vector3& reading_m) -> std::optional<calib::Vector3> {
+    const auto& model = one.model.document.model;
+    if (!model.holds_for_tool(one.tool_m) || !model.validity().contains(reading_m))
+      return std::nullopt;
+    return model.V_at(reading_m, one.tool_m);
+  };
+}
+
 /// The shots at places inside the validity volume that alone do not fit the model.
 std::vector<std::string> off_with_model(const VerificationFile& file,
                                         const verify::Observations& observed,
@@ -113,12 +123,20 @@ std::vector<std::string> off_with_model(const VerificationFile& file,
       file, off, "check or repeat this point; if it is right, the model is wrong there");
 }
 
+/// `error` with the usual mistakes that explain it.
+Error with_mistakes(Error error, const std::vector<std::string>& mistakes) {
+  for (const std::string& text : mistakes) error.details.push_back("they fit with " + text);
+  return error;
+}
+
 /// One model, also on the grid.
 Result<void> compare_one(Verification& v, const VerificationFile& file,
                          const verify::Options& options) {
   ModelAtPoints& one = v.models.front();
+  v.likely_mistakes = verify::likely_mistakes(file.points, v.observations.frame, errors_of(one));
   auto compared = verify::compare(v.observations, one.model.document.model, one.tool_m, options);
-  if (!compared) return tl::make_unexpected(error_of(compared.error()));
+  if (!compared)
+    return tl::make_unexpected(with_mistakes(error_of(compared.error()), v.likely_mistakes));
   one.comparison = std::move(*compared);
   v.inside = one.comparison.inside.size();
   v.points_off = off_with_model(file, v.observations, one);
@@ -180,7 +198,7 @@ Result<Verification> verify_models(const VerifyArguments& arguments,
   const auto points = points_for(v, arguments, progress);
   ABBE_TRY(points);
   cut_short = points->cut_short;
-  auto observed = observed_in(arguments, points->file);
+  auto observed = observed_in(arguments, points->file, errors_of(v.models.front()));
   ABBE_TRY(observed);
   v.observations = std::move(*observed);
   ABBE_TRY(v.models.size() > 1 ? compare_each(v) : compare_one(v, points->file, *options));

@@ -49,7 +49,7 @@ Result<LivePoints> points_of_recording(const std::string& file, const Progress& 
   ABBE_TRY(replayed);
   standstills.finish();
 
-  LivePoints out{{recording->source, {}, {}}, {}, config.machine.name};
+  LivePoints out{{recording->source, {}, {}, 0}, {}, config.machine.name};
   for (const auto& p : standstills.points()) out.file.points.push_back(p.mean);
   if (const auto damage = recording->reader.damage(); !damage.empty())
     out.cut_short = Error{ErrorCode::DataInsufficient, fmt::format("{}: {}", file, damage), {}};
@@ -123,6 +123,7 @@ Result<LivePoints> points_for(Verification& v, const VerifyArguments& arguments,
   ABBE_TRY(points);
   if (!points->file.source.name.empty()) v.inputs = {points->file.source};
   v.lines = points->file.lines;
+  v.repeated = points->file.repeated;
   if (points->cut_short) v.cut_short = points->cut_short->text;
   return points;
 }
@@ -139,9 +140,11 @@ std::vector<std::string> lines_of_points_off(const VerificationFile& file,
 }
 
 Result<verify::Observations> observed_in(const VerifyArguments& arguments,
-                                         const VerificationFile& file) {
+                                         const VerificationFile& file,
+                                         const verify::ErrorsAt& errors_at) {
   auto observed = verify::observe(
-      file.points, arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
+      file.points, arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine,
+      errors_at);
   if (!observed) return tl::make_unexpected(with_points_off(error_of(observed.error()), file));
   return std::move(*observed);
 }

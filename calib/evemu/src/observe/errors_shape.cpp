@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 
@@ -47,6 +47,10 @@ std::vector<AxisMistake> mistakes_of_errors() {
       {"all signs reversed (V = actual - nominal, in um)", -Matrix3::Identity()},
       {"errors in mm instead of um", 1e3 * Matrix3::Identity()},
       {"errors in mm instead of um and all signs reversed", -1e3 * Matrix3::Identity()}};
+  // Readings times f have the shape of readings + V / f, times f.
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    all.push_back({mistake.text + " (readings)", Matrix3::Identity() / mistake.factor});
+  }
   for (const AxisMistake& mistake : axis_mistakes()) {
     all.push_back({mistake.text + " in errors or readings", mistake.M});
   }
@@ -56,9 +60,11 @@ std::vector<AxisMistake> mistakes_of_errors() {
 }  // namespace
 
 Result<void> check_one_shape(const Observations& o) {
-  constexpr double kClearly = 1.0 / 3.0, kLeast_m = 1e-6;
+  constexpr double kLeast_m = 1e-6;
   const double given_m = shape_scatter_m(o, Matrix3::Identity());
-  double best_m = std::max(kClearly * given_m, kLeast_m / 10.0);
+  // Errors that do not fit the readings at all fit best if they are made small: no mistake.
+  const double without_m = shape_scatter_m(o, Matrix3::Zero());
+  double best_m = std::max(kFarBetter * std::min(given_m, without_m), kLeast_m / 10.0);
   std::string text;
 
   for (const AxisMistake& mistake : mistakes_of_errors()) {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/units.hpp"
 #include "abbe/result/try.hpp"
 #include "observe/touch_checks.hpp"

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 
 namespace abbe::calib::mfb {

@@ -5,13 +5,13 @@
 #include <limits>
 #include <optional>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/calib/internal/geometry/range_change.hpp"
 #include "abbe/result/try.hpp"
 #include "run/path_corrections.hpp"
 #include "run/progress.hpp"
-#include "run/range_offset.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -256,21 +256,42 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
       texts.push_back(mistake.text);
     }
   }
-  return texts.empty() ? "one axis of the path or of the tracker's frame reversed, or two swapped"
-                       : or_list(texts) + ", or with the tracker frame reflected";
+  return texts.empty()
+             ? "one axis of the path or of the tracker's frame reversed, or two swapped"
+             : or_list(texts) +
+                   ", or with the tracker frame reflected (azimuth or elevation reversed)";
 }
 
 }  // namespace
 
 namespace {
 
-SegmentSeries with_longer_ranges(SegmentSeries series, double longer_m) {
+/// The series with other points of the tracker.
+template <class Corrected>
+SegmentSeries with_points(SegmentSeries series, const Corrected& corrected) {
   for (Segment& b : series.segments) {
-    b.mean_tracker_m = with_longer_range(b.mean_tracker_m, longer_m);
+    b.mean_tracker_m = corrected(b.mean_tracker_m);
   }
-  series.start_tracker_m = with_longer_range(series.start_tracker_m, longer_m);
-  series.end_tracker_m = with_longer_range(series.end_tracker_m, longer_m);
+  series.start_tracker_m = corrected(series.start_tracker_m);
+  series.end_tracker_m = corrected(series.end_tracker_m);
   return series;
+}
+
+SegmentSeries with_longer_ranges(const SegmentSeries& series, double longer_m) {
+  return with_points(series, [&](const Vector3& p) { return with_longer_range(p, longer_m); });
+}
+
+/// "; they fit with zenith angles instead of elevations"; empty if no other meaning of the angles
+/// makes the points fit.
+std::string angles_that_fit(const SegmentSeries& series, const Machine& machine, const Path& path,
+                            const Options& options) {
+  std::vector<std::string> texts;
+  for (const AngleMistake& mistake : angle_mistakes()) {
+    if (align_as_given(with_points(series, mistake.corrected), machine, path, options)) {
+      texts.push_back(mistake.text);
+    }
+  }
+  return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
 /// "; they fit with ranges shorter by 19.05 mm (...)"; empty if no change of the ranges makes the
@@ -330,13 +351,17 @@ Result<Alignment> align(const SegmentSeries& series, const Machine& machine, con
       (a.error().code == ErrorCode::AlignmentFailed || a.error().code == ErrorCode::NotConverged)) {
     Options quiet = options;
     quiet.progress = {};
-    const std::string corrections =
-        corrections_that_fit(path, machine.nodes, [&](const Path& other) {
-          return !(options.stopped && options.stopped()) &&
-                 align_as_given(series, machine, other, quiet).has_value();
-        });
-    a.error().text +=
-        corrections.empty() ? range_change_that_fits(series, machine, path, quiet) : corrections;
+    std::string corrections = corrections_that_fit(path, machine.nodes, [&](const Path& other) {
+      return !(options.stopped && options.stopped()) &&
+             align_as_given(series, machine, other, quiet).has_value();
+    });
+    if (corrections.empty()) {
+      corrections = angles_that_fit(series, machine, path, quiet);
+    }
+    if (corrections.empty()) {
+      corrections = range_change_that_fits(series, machine, path, quiet);
+    }
+    a.error().text += corrections;
   }
   return a;
 }

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 #include "abbe/calib/internal/statistics/median.hpp"
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 
 namespace abbe::calib::otf {

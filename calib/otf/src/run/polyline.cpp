@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/message.hpp"
 
 namespace abbe::calib::otf {

@@ -4,13 +4,14 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/internal/base/message.hpp"
+#include "abbe/calib/internal/geometry/range_change.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/result/try.hpp"
 #include "run/match_in_order.hpp"
 #include "run/path_corrections.hpp"
-#include "run/range_offset.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -329,20 +330,41 @@ Result<void> check_size(std::size_t standstills, std::size_t positions) {
   return {};
 }
 
+/// True if the standstills with other points of the tracker match the positions.
+template <class Corrected>
+bool fits_with_points(std::span<const Standstill> standstills, const Corrected& corrected,
+                      const Machine& machine, const Path& path, const Options& options) {
+  if (options.stopped && options.stopped()) {
+    return false;
+  }
+  std::vector<Standstill> changed(standstills.begin(), standstills.end());
+  for (Standstill& s : changed) {
+    s.mean_tracker_m = corrected(s.mean_tracker_m);
+  }
+  return assign_as_given(changed, machine, path, options).has_value();
+}
+
+/// "; they fit with zenith angles instead of elevations"; empty if no other meaning of the angles
+/// makes the standstills match the positions.
+std::string angles_that_fit(std::span<const Standstill> standstills, const Machine& machine,
+                            const Path& path, const Options& options) {
+  std::vector<std::string> texts;
+  for (const AngleMistake& mistake : angle_mistakes()) {
+    if (fits_with_points(standstills, mistake.corrected, machine, path, options)) {
+      texts.push_back(mistake.text);
+    }
+  }
+  return texts.empty() ? "" : "; they fit with " + or_list(texts);
+}
+
 /// "; they fit with ranges shorter by 19.05 mm (...)" if the radius of a usual reflector, added to
 /// or subtracted from all ranges, makes the standstills match the positions; else empty.
 std::string reflector_that_fits(std::span<const Standstill> standstills, const Machine& machine,
                                 const Path& path, const Options& options) {
   for (const double radius_m : reflector_radii_m()) {
     for (const double change_m : {-radius_m, radius_m}) {
-      if (options.stopped && options.stopped()) {
-        return "";
-      }
-      std::vector<Standstill> changed(standstills.begin(), standstills.end());
-      for (Standstill& s : changed) {
-        s.mean_tracker_m = with_longer_range(s.mean_tracker_m, change_m);
-      }
-      if (assign_as_given(changed, machine, path, options)) {
+      const auto longer = [&](const Vector3& p) { return with_longer_range(p, change_m); };
+      if (fits_with_points(standstills, longer, machine, path, options)) {
         return "; they fit with " + range_change_text(change_m);
       }
     }
@@ -363,13 +385,17 @@ Result<StandstillAssignment> assign_standstills(std::span<const Standstill> stan
 
   Result<StandstillAssignment> a = assign_as_given(standstills, machine, path, options);
   if (!a && a.error().code == ErrorCode::AlignmentFailed) {
-    const std::string corrections =
-        corrections_that_fit(path, machine.nodes, [&](const Path& other) {
-          return !(options.stopped && options.stopped()) &&
-                 assign_as_given(standstills, machine, other, options).has_value();
-        });
-    a.error().text += corrections.empty() ? reflector_that_fits(standstills, machine, path, options)
-                                          : corrections;
+    std::string corrections = corrections_that_fit(path, machine.nodes, [&](const Path& other) {
+      return !(options.stopped && options.stopped()) &&
+             assign_as_given(standstills, machine, other, options).has_value();
+    });
+    if (corrections.empty()) {
+      corrections = angles_that_fit(standstills, machine, path, options);
+    }
+    if (corrections.empty()) {
+      corrections = reflector_that_fits(standstills, machine, path, options);
+    }
+    a.error().text += corrections;
   }
   return a;
 }

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "abbe/base/units.hpp"
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "usable_touch.hpp"
 

@@ -98,11 +98,13 @@ struct PointsFile {
 [[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
 
 /// verification.csv: `x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm`: scale reading, and
-/// the independent measurement of the same point in the frame of the tracker; at least one.
+/// the independent measurement of the same point in the frame of the tracker; at least one. A row
+/// that repeats an earlier row in every digit is not another measurement: it counts once.
 struct VerificationFile {
   InputFile source;
   std::vector<calib::verify::MeasuredPoint> points;
   std::vector<std::size_t> lines;  ///< line of each point; empty if not read from a file
+  std::size_t repeated = 0;        ///< rows left out because they repeat another row
 };
 [[nodiscard]] Result<VerificationFile> read_verification_csv(const std::filesystem::path& file);
 [[nodiscard]] std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points);

@@ -29,8 +29,12 @@ struct Verification {
   std::size_t inside = 0;                    ///< places that are compared
   std::vector<InputFile> inputs;
   std::vector<std::size_t> lines;  ///< line numbers of the shots in their file; may be empty
+  std::size_t repeated = 0;        ///< rows of the file that repeat another row and are left out
   /// Points that alone do not fit the model, one line each; empty for several models.
   std::vector<std::string> points_off;
+  /// Usual mistakes in the points with which they fit the model far better, one line each; empty
+  /// for several models.
+  std::vector<std::string> likely_mistakes;
   /// why some points are missing or may be wrong; empty: all are complete
   std::string cut_short;
   std::string different_machines;  ///< different_machines(); of one model also one of its cautions

@@ -12,6 +12,7 @@
 /// many shots has the same weight as one with a single shot. Lengths in m. Pure; allocates.
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -57,9 +58,22 @@ inline constexpr double kSamePlaceOfExtent = 1.0 / 500.0;
 /// give larger residuals.
 inline constexpr double kMostLackOfFit = 0.01;
 
+/// V of a model at a scale reading, m; nullopt where the model is not valid.
+using ErrorsAt = std::function<std::optional<Vector3>(const Vector3& reading_m)>;
+
 /// Errors: NotFinite; TooFewObservations for fewer than 4 places; DegenerateGeometry if the places
 /// do not span a volume; AlignmentFailed if the residuals exceed kMostLackOfFit (with
-/// Frame::Machine after subtraction of their mean).
-[[nodiscard]] Result<Observations> observe(std::span<const MeasuredPoint>, Frame = Frame::BestFit);
+/// Frame::Machine after subtraction of their mean); its text names the usual mistakes whose
+/// correction makes the points fit. `errors_at`: decides between mistakes that fit equally well
+/// without a model, such as two swapped axes and one reversed axis; may be empty.
+[[nodiscard]] Result<Observations> observe(std::span<const MeasuredPoint>, Frame = Frame::BestFit,
+                                           const ErrorsAt& errors_at = {});
+
+/// Mistakes with which the points fit a model far better than as given, although the points as
+/// given fit a rigid motion: two axes of the readings reversed, axes in another order, a constant
+/// of all ranges, columns exchanged. "X and Y reversed (readings): 3.4 um rms left, 76 um as
+/// given", one text for each; empty for sound points.
+[[nodiscard]] std::vector<std::string> likely_mistakes(std::span<const MeasuredPoint>, Frame,
+                                                       const ErrorsAt& errors_at);
 
 }  // namespace abbe::calib::verify

@@ -1,6 +1,8 @@
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "abbe/calib/internal/base/message.hpp"
 
@@ -67,12 +69,28 @@ bool fills(std::span<const Vector3> points_m, double factor, const MachineNodes&
   return false;
 }
 
-/// Units of the points that may be wrong, and those of the travel.
-std::vector<UnitMistake> units_of_points_or_travel() {
+/// Units of the points that may be wrong, and those of the travel. Points in um and a travel in m
+/// differ by the same factor; the size of the travel decides.
+std::vector<UnitMistake> units_of_points_or_travel(const MachineNodes& travel) {
+  constexpr double kShortest_m = 20e-3, kMicrometre = 1e-3;
   std::vector<UnitMistake> all = unit_mistakes();
+  const bool is_short = std::all_of(travel.begin(), travel.end(), [](const AxisNodes& axis) {
+    return travel_m(axis) < kShortest_m;
+  });
+  if (is_short) {
+    std::erase_if(all, [](const UnitMistake& m) { return m.factor == kMicrometre; });
+    all.push_back({"the travel of the axes in m instead of mm", 1e-3});
+  }
   all.push_back({"the travel of the axes in inches instead of mm", 1.0 / 25.4});
-  all.push_back({"the travel of the axes in m instead of mm", 1e-3});
   return all;
+}
+
+double azimuth(const Vector3& p) {
+  return std::atan2(p.y(), p.x());
+}
+
+double elevation(const Vector3& p) {
+  return std::atan2(p.z(), std::hypot(p.x(), p.y()));
 }
 
 }  // namespace
@@ -101,6 +119,29 @@ const std::vector<UnitMistake>& unit_mistakes() {
   return all;
 }
 
+const std::vector<AngleMistake>& angle_mistakes() {
+  static const std::vector<AngleMistake> all{
+      {"zenith angles instead of elevations",
+       [](const Vector3& p) {
+         return from_spherical(p.norm(), azimuth(p), 0.5 * std::numbers::pi - elevation(p));
+       }},
+      {"azimuth and elevation swapped",
+       [](const Vector3& p) { return from_spherical(p.norm(), elevation(p), azimuth(p)); }}};
+  return all;
+}
+
+std::vector<TriedCorrection> far_better(double left_as_given, std::vector<TriedCorrection> tried) {
+  std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) {
+    return a.left < b.left || (!std::isnan(a.left) && std::isnan(b.left));
+  });
+  const double most =
+      tried.empty() ? 0.0
+                    : std::min(kFarBetter * left_as_given, kAsGoodAsBest * tried.front().left);
+  std::erase_if(
+      tried, [&](const TriedCorrection& t) { return !std::isfinite(t.left) || !(t.left <= most); });
+  return tried;
+}
+
 std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m,
                                           const MachineNodes& travel, double tolerance_m) {
   std::vector<OutsideTravel> found;
@@ -127,7 +168,7 @@ std::string corrections_inside_travel(std::span<const Vector3> points_m,
   }
 
   const bool explained = !texts.empty();
-  for (const UnitMistake& mistake : units_of_points_or_travel()) {
+  for (const UnitMistake& mistake : units_of_points_or_travel(travel)) {
     if (!explained && all_inside(points_m, mistake.factor * Matrix3::Identity(), travel) &&
         fills(points_m, mistake.factor, travel)) {
       texts.push_back(mistake.text);

@@ -1,11 +1,11 @@
-#include "run/range_offset.hpp"
+#include "abbe/calib/internal/geometry/range_change.hpp"
 
 #include <array>
 #include <cmath>
 
 #include "abbe/calib/internal/base/message.hpp"
 
-namespace abbe::calib::otf {
+namespace abbe::calib {
 
 Vector3 with_longer_range(const Vector3& p_tracker_m, double longer_m) {
   const double range_m = p_tracker_m.norm();
@@ -46,4 +46,4 @@ std::span<const double> reflector_radii_m() {
   return kRadii;
 }
 
-}  // namespace abbe::calib::otf
+}  // namespace abbe::calib

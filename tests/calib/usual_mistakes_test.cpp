@@ -1,7 +1,10 @@
-#include "abbe/calib/geometry/axis_mistakes.hpp"
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 
 #include <gmock/gmock.h>
 
+#include <limits>
+#include <numbers>
+#include <string>
 #include <vector>
 
 namespace abbe::calib {
@@ -58,6 +61,43 @@ TEST(CorrectionsInsideTravel, NameAReversedAxis) {
   // X and Y are symmetric, so that they may be reversed, too.
   EXPECT_THAT(corrections_inside_travel(path, travel_times()),
               HasSubstr("; all are inside with Z reversed"));
+}
+
+std::vector<std::string> texts(const std::vector<TriedCorrection>& found) {
+  std::vector<std::string> all;
+  for (const TriedCorrection& t : found) all.push_back(t.text);
+  return all;
+}
+
+TEST(FarBetter, NamesTheBestFirstAndWhatFitsEquallyWell) {
+  EXPECT_THAT(texts(far_better(10.0, {{"a", 3.0}, {"b", 2.1}, {"c", 9.0}, {"d", 3.3}})),
+              testing::ElementsAre("b", "a"));
+  EXPECT_THAT(texts(far_better(10.0, {{"a", 3.0}, {"b", 0.1}})), testing::ElementsAre("b"));
+}
+
+TEST(FarBetter, NamesNothingThatIsOnlySomewhatBetter) {
+  EXPECT_TRUE(far_better(10.0, {{"a", 3.4}, {"b", 10.0}}).empty());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(far_better(nan, {{"a", 3.4}}).empty());
+  EXPECT_TRUE(
+      far_better(10.0, {{"a", nan}, {"b", std::numeric_limits<double>::infinity()}}).empty());
+  EXPECT_TRUE(far_better(10.0, {}).empty());
+}
+
+TEST(AngleMistakes, GiveTheRightPointFromTheWrongAngles) {
+  constexpr double kRange_m = 2.0, kAzimuth = 0.7, kElevation = -0.3;
+  const Vector3 right = from_spherical(kRange_m, kAzimuth, kElevation);
+  const double zenith = 0.5 * std::numbers::pi - kElevation;
+  ASSERT_EQ(angle_mistakes().size(), 2u);
+  EXPECT_LT((angle_mistakes()[1].corrected(from_spherical(kRange_m, kElevation, kAzimuth)) - right)
+                .norm(),
+            1e-12);
+  // above the tracker, where a zenith angle is also a possible elevation
+  const Vector3 above = from_spherical(kRange_m, kAzimuth, 0.3);
+  EXPECT_LT(
+      (angle_mistakes()[0].corrected(from_spherical(kRange_m, kAzimuth, zenith - 0.6)) - above)
+          .norm(),
+      1e-12);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 
 #include "abbe/calib/geometry/rigid_transform.hpp"
 
-namespace abbe::calib::otf {
+namespace abbe::calib {
 
 /// The point measured in the direction of `p_tracker_m` with a range that is longer by `longer_m`.
 [[nodiscard]] Vector3 with_longer_range(const Vector3& p_tracker_m, double longer_m);
@@ -27,4 +27,4 @@ namespace abbe::calib::otf {
 /// Radii of usual reflectors: 1.5, 7/8 and 1/2 inch.
 [[nodiscard]] std::span<const double> reflector_radii_m();
 
-}  // namespace abbe::calib::otf
+}  // namespace abbe::calib

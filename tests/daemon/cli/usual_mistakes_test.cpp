@@ -273,11 +273,14 @@ Measurement ball_errors(unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0.0, 1.0);
   std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
-  for (const auto& e : tests::evemu::reference_errors())
+  for (const auto& e : tests::evemu::reference_errors()) {
+    // Errors are relative to Ball1: that of Ball1 at the first position is 0.
+    const double size = e.V_m.isZero(0.0) ? 0.0 : 1.0;
+    const Vector3 V_um = 1e6 * e.V_m + size * Vector3(noise(random), noise(random), noise(random));
     text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", e.position,
                         e.ball, 1e3 * e.reading_m.x(), 1e3 * e.reading_m.y(), 1e3 * e.reading_m.z(),
-                        1e6 * e.V_m.x() + noise(random), 1e6 * e.V_m.y() + noise(random),
-                        1e6 * e.V_m.z() + noise(random));
+                        V_um.x(), V_um.y(), V_um.z());
+  }
   return {{{"machine.toml", to_toml(config_tables::weak_portal())}, {"e.csv", text}},
           "identify evemu --machine machine.toml --errors e.csv -o out"};
 }

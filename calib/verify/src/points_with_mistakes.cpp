@@ -17,7 +17,7 @@ using Points = std::vector<MeasuredPoint>;
 
 constexpr double kDoesNotFit = std::numeric_limits<double>::infinity();
 constexpr double kLeastInside = 0.7;  // share of the points at which the model must be valid
-constexpr std::size_t kLeastPoints = 4;
+constexpr std::size_t kFewestOfMistakes = 4;
 
 /// What points leave.
 struct Left {
@@ -37,7 +37,7 @@ Left left_by(std::span<const MeasuredPoint> points, Frame frame, const ErrorsAt&
     }
   }
   const auto n = static_cast<double>(from.size());
-  if (from.size() < kLeastPoints || n < kLeastInside * static_cast<double>(points.size())) {
+  if (from.size() < kFewestOfMistakes || n < kLeastInside * static_cast<double>(points.size())) {
     return {};
   }
 

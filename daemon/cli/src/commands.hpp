@@ -25,6 +25,7 @@ void add_sensors(CLI::App& parent, int& exit);
 void add_machine(CLI::App& parent, int& exit);
 void add_machine_identity(CLI::App& machine, int& exit);
 void add_tracker(CLI::App& parent, int& exit);
+void add_probe_lines(CLI::App& parent, int& exit);
 void add_calibrate_probe(CLI::App& parent, int& exit);
 void add_calibrate_artefact(CLI::App& parent, int& exit);
 void add_calibrate_bar(CLI::App& parent, int& exit);

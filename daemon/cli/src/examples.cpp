@@ -51,6 +51,11 @@ constexpr std::array kExamples{
     Example{"tracker reflector", "list"},
     Example{"tracker reflector list", ""},
     Example{"tracker reflector set", "7"},
+    Example{"probe-lines",
+            "--host 10.0.0.7 --port 7001\n"
+            "         abbe probe-lines --host 10.0.0.7 --port 7001 --columns time,x,y,z,status \\\n"
+            "           --valid-status 0 --length-unit mm --weather compute --frame tracker "
+            "-o tracker.toml"},
     Example{"replay", "run.mcap --raw"},
     Example{"identify", "otf --recording run.mcap -o result"},
     Example{"identify otf",

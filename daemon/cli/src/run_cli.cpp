@@ -67,6 +67,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_sensors(app, exit);
   add_machine(app, exit);
   add_tracker(app, exit);
+  add_probe_lines(app, exit);
   add_replay(app, exit);
   auto* identify = app.add_subcommand(
       "identify", "Identify a machine's geometric errors, or an artefact, from recorded files");

@@ -187,6 +187,13 @@ drivers::LineTrackerOptions line_options(const TrackerConfig& config, double spe
   return options;
 }
 
+Result<drivers::LineTrackerOptions> parse_line_options(std::string_view table) {
+  const auto config = parse_tracker_table(table);
+  ABBE_TRY(config);
+  if (!config->lines) return fail(ErrorCode::BadInput, "the table has another protocol than lines");
+  return line_options(*config, 1.0);
+}
+
 const DeviceKind kTracker{.moves = true,
                           .name = &name_tracker,
                           .start = &start_tracker,

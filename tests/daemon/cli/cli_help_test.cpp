@@ -100,6 +100,7 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "tracker reflector",
                                     "tracker reflector list",
                                     "tracker reflector set",
+                                    "probe-lines",
                                     "replay",
                                     "identify",
                                     "identify otf",

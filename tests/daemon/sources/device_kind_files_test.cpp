@@ -28,7 +28,7 @@ struct KindWords {
 const std::vector<KindWords> kKinds{
     {"tracker",
      {"TrackerConfig", "TrackerModeConfig", "WeatherConfig", "kTracker"},
-     {"kinds/tracker", "devices/src/tracker", "devices/tracker_options"}},
+     {"kinds/tracker", "kinds/tracker_lines", "devices/src/tracker", "devices/tracker_options"}},
     {"encoder",
      {"EncoderConfig", "EncoderNodeConfig", "SyncConfig", "kEncoder"},
      {"kinds/encoder", "devices/src/encoder", "devices/encoder_options"}},

@@ -8,6 +8,8 @@
 #include "abbe/config/calibration_input.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/drivers/tracker/order.hpp"
+#include "abbe/result/try.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
@@ -298,6 +300,21 @@ std::optional<TrackerSource> points_of_tracker(const Config& config) {
 }
 
 }  // namespace
+
+Result<TrackerConfig> parse_tracker_table(std::string_view text) {
+  const std::string name = "[tracker]";
+  const auto table = parse_toml(text, name);
+  ABBE_TRY(table);
+  Faults faults(name, kMostConfigFaults);
+  Config config;
+  StreamNames names;
+  ClassifiedSection root{Section{&*table, "", {1, 1}, faults, Origin::Written}, "", config.meaning};
+  read_tracker(root, config, names);
+  root.close();
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  if (!config.of<TrackerConfig>()) return fail(ErrorCode::BadInput, name + ": has no host");
+  return *config.of<TrackerConfig>();
+}
 
 const ConfigKind TrackerConfig::kKind{.key = "tracker",
                                       .needs = "host",

@@ -11,6 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/base/faults.hpp"
+#include "abbe/result/try.hpp"
+#include "abbe/settings/bounded_toml.hpp"
 #include "plausible.hpp"
 #include "read_lines.hpp"
 
@@ -57,7 +60,7 @@ void read_columns_of_line(ClassifiedSection& section, LineFormat& format) {
   section.get(measurement("columns"), names);
   if (names.empty())
     return section.fault("columns", fmt::format("missing: the columns of a line in their order, "
-                                                "of {}",
+                                                "of {}; `abbe probe-lines` finds them",
                                                 all_columns()));
   if (names.size() > LineFormat::kMostColumns)
     return section.fault("columns", fmt::format("must be at most {}", LineFormat::kMostColumns));
@@ -155,6 +158,95 @@ drivers::LineAddress read_address(ClassifiedSection& section) {
 }
 
 }  // namespace
+
+namespace {
+
+std::string toml_text(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + '"';
+}
+
+std::string toml_texts(const std::vector<std::string>& texts) {
+  std::string out;
+  for (const std::string& text : texts) out += (out.empty() ? "" : ", ") + toml_text(text);
+  return "[" + out + "]";
+}
+
+/// Lines "key = value" of the keys that are stated.
+class StatedKeys {
+ public:
+  void add(std::string_view key, std::string_view text) {
+    if (!text.empty()) add_value(key, toml_text(text));
+  }
+  void add(std::string_view key, const std::vector<std::string>& texts) {
+    if (!texts.empty()) add_value(key, toml_texts(texts));
+  }
+  void add(std::string_view key, int number) {
+    if (number != 0) add_value(key, fmt::format("{}", number));
+  }
+  void add(std::string_view key, double number) {
+    if (number != 0.0) add_value(key, fmt::format("{:.6g}", number));
+  }
+  [[nodiscard]] const std::string& text() const noexcept { return text_; }
+
+ private:
+  void add_value(std::string_view key, std::string_view value) {
+    text_ += fmt::format("{} = {}\n", key, value);
+  }
+  std::string text_;
+};
+
+void add_address(const StatedLines& stated, StatedKeys& keys) {
+  keys.add("transport", stated.transport);
+  keys.add("host", stated.host);
+  keys.add("port", stated.port);
+  keys.add("serial", stated.serial);
+  keys.add("baud", stated.baud);
+  keys.add("parity", stated.parity);
+  keys.add("stop_bits", stated.stop_bits);
+}
+
+}  // namespace
+
+std::string tracker_table(const StatedLines& stated) {
+  StatedKeys keys;
+  keys.add("protocol", "lines");
+  add_address(stated, keys);
+  keys.add("columns", stated.columns);
+  keys.add("valid_status", stated.valid_status);
+  keys.add("length_unit", stated.length_unit);
+  keys.add("angle_unit", stated.angle_unit);
+  keys.add("time_unit", stated.time_unit);
+  keys.add("separator", stated.separator);
+  keys.add("decimal", stated.decimal);
+  keys.add("point_rate_hz", stated.point_rate_hz);
+  if (stated.stationary_time_ms != 0) keys.add("mode", "stationary");
+  keys.add("stationary_time_ms", stated.stationary_time_ms);
+  keys.add("weather", stated.weather);
+  return "[tracker]\n" + keys.text();
+}
+
+Result<drivers::LineAddress> line_address(const StatedLines& stated) {
+  StatedKeys keys;
+  add_address(stated, keys);
+  const auto table = parse_toml(keys.text(), "options");
+  ABBE_TRY(table);
+  Faults faults("options", kMostConfigFaults);
+  Meaning unused;
+  ClassifiedSection section{Section{&*table, "", {1, 1}, faults, Origin::Written}, "", unused};
+  auto address = read_address(section);
+  if (!faults.any())
+    if (const auto valid = drivers::check(address); !valid)
+      return fail(ErrorCode::Usage, valid.error().text);
+  if (!faults.any()) return address;
+  Error error = faults.to_error();
+  error.code = ErrorCode::Usage;
+  return tl::make_unexpected(std::move(error));
+}
 
 std::string format_text(const LineFormat& format) {
   std::string text;

@@ -1,6 +1,9 @@
 #pragma once
 /// The options of the tracker driver, the same for a live device and for its replay. Pure.
 
+#include <string_view>
+
+#include "abbe/base/error.hpp"
 #include "abbe/config/kinds/tracker.hpp"
 #include "abbe/drivers/lines/tracker_device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
@@ -14,5 +17,8 @@ namespace abbe::daemon {
 
 /// As device_options(), for a tracker with lines.
 [[nodiscard]] drivers::LineTrackerOptions line_options(const TrackerConfig& config, double speed);
+
+/// Options for a tracker with lines whose table has this text.
+[[nodiscard]] Result<drivers::LineTrackerOptions> parse_line_options(std::string_view table);
 
 }  // namespace abbe::daemon

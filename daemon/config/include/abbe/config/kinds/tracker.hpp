@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
+#include "abbe/base/error.hpp"
 #include "abbe/config/kinds/tracker_lines.hpp"
 
 namespace abbe::daemon {
@@ -60,5 +62,9 @@ struct TrackerConfig {
   /// Search around the direction of the beam. nullopt: the controller's settings are not changed.
   std::optional<TrackerSearchConfig> search;
 };
+
+/// Reads and checks the text of the table alone, as load_config() does with a whole file. The table
+/// must configure a device.
+[[nodiscard]] Result<TrackerConfig> parse_tracker_table(std::string_view text);
 
 }  // namespace abbe::daemon

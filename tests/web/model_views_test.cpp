@@ -7,6 +7,8 @@
 #include <array>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "abbe/model/model_store.hpp"
 #include "synthetic_model.hpp"
@@ -15,6 +17,7 @@
 namespace abbe::web {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -46,6 +49,20 @@ TEST_F(ModelViewsTest, AModelThatIsAddedIsInHistoryAndTrend) {
   add(2);
   EXPECT_EQ(nlohmann::json::parse(views_.trend().value())["models"].size(), 2u);
   EXPECT_EQ(nlohmann::json::parse(views_.history().value())["models"].size(), 2u);
+}
+
+TEST_F(ModelViewsTest, TheHistoryHasTheNewestModelsAndTheActiveOne) {
+  std::vector<std::string> ids;
+  for (unsigned seed = 1; seed <= 6; ++seed) ids.push_back(add(seed));
+  auto store = daemon::ModelStore::open(folder_ / "models");
+  ASSERT_TRUE(store->activate(ids.front(), {.who = "anna", .why = "", .when = {}}));
+  ModelViews few{folder_ / "models", {}, 3};
+  const auto history = nlohmann::json::parse(few.history().value());
+  std::vector<std::string> listed;
+  for (const auto& model : history["models"]) listed.push_back(model["id"]);
+  EXPECT_THAT(listed, ElementsAre(ids[5], ids[4], ids[3], ids[0]));
+  EXPECT_EQ(history["left_out"], 2);
+  EXPECT_EQ(nlohmann::json::parse(views_.history().value())["left_out"], 0);
 }
 
 TEST_F(ModelViewsTest, AModelIsShownWithItsVerdictAndTheEventsThatCameLater) {

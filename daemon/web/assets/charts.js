@@ -1,6 +1,7 @@
 // Line charts with bands of U = 2 u, drawn by Chart.js.
 
 import { h } from "./dom.js";
+import { localTime, timeTicks, zoneOf } from "./local_time.js";
 import { isDark, onPalette, palette, prefersMore } from "./palette.js";
 
 /** Loads a classic script of the server once; after a fault the next call tries again. */
@@ -33,6 +34,43 @@ function datasets(curves) {
   });
 }
 
+/** Of a label of the time axis, px with the space beside it. */
+const kTimeLabel_px = 95;
+
+/** Smallest and largest time of the curves; a part of the time between them is left free at both ends. */
+function timeRange(curves) {
+  const times = curves.flatMap((c) => c.x);
+  const first = Math.min(...times), last = Math.max(...times);
+  const free = Math.max((last - first) * 0.03, 3600e3);
+  return { min: first - free, max: last + free };
+}
+
+/** An axis of local time for times in ms since 1970. */
+export function timeAxis(axis, { min, max }) {
+  return { ...axis, min, max,
+    title: { ...axis.title, text: `${axis.title.text}, local time (UTC${zoneOf(max)})` },
+    afterBuildTicks: (scale) => {
+      scale.ticks = timeTicks(scale.min, scale.max, Math.max(2, Math.floor((scale.width || scale.maxWidth) / kTimeLabel_px)));
+    },
+    ticks: { ...axis.ticks, maxRotation: 0, autoSkip: false, callback: (value, i, ticks) => ticks[i].label } };
+}
+
+/** "12.346 \u00b1 0.25 um (k = 2)" */
+function valueInWords(curve, i, unit) {
+  const digits = (value) => Number(value.toPrecision(6));
+  const U = curve.u?.[i] ? ` \u00b1 ${Number((2 * curve.u[i]).toPrecision(2))}` : "";
+  return `${digits(curve.y[i])}${U} ${unit}${U ? " (k = 2)" : ""}`;
+}
+
+/** What is shown beside a point of a chart with a time axis: time, name of the point, value with unit. */
+function timeTooltip(chart) {
+  const curveOf = (item) => chart.curves.find((c) => c.name === item.dataset.label);
+  return {
+    title: (items) => (items.length ? [localTime(items[0].parsed.x), curveOf(items[0]).names?.[items[0].dataIndex] ?? ""] : ""),
+    label: (item) => `${item.dataset.label}: ${valueInWords(curveOf(item), item.dataIndex, chart.y_label)}`,
+  };
+}
+
 function options(chart) {
   const of = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const text = of("--text");
@@ -44,9 +82,10 @@ function options(chart) {
     plugins: {
       title: { display: true, text: chart.title, color: text },
       legend: { labels: { color: text, filter: (item, data) => !data.datasets[item.datasetIndex].band } },
-      tooltip: { filter: (item) => !item.dataset.band },
+      tooltip: { filter: (item) => !item.dataset.band, ...(chart.x_is_time ? { callbacks: timeTooltip(chart) } : {}) },
     },
-    scales: { x: axis(chart.x_label), y: axis(chart.y_label) },
+    scales: { x: chart.x_is_time ? timeAxis(axis(chart.x_label), timeRange(chart.curves)) : axis(chart.x_label),
+      y: axis(chart.y_label) },
   };
 }
 
@@ -56,10 +95,11 @@ function inWords(chart) {
     const known = curve.y.filter((y) => typeof y === "number");
     return `${curve.name}: ${Math.min(...known).toFixed(1)} to ${Math.max(...known).toFixed(1)}`;
   };
-  return `${chart.title}, ${chart.y_label} over ${chart.x_label}. ${chart.curves.map(range).join("; ")}`;
+  return `${chart.title}, ${chart.y_label} over ${chart.x_is_time ? "time" : chart.x_label}. ${chart.curves.map(range).join("; ")}`;
 }
 
-/** Draws `chart` ({title, x_label, y_label, curves: [{name, x, y, u}]}); returns what removes it. */
+/** Draws `chart` ({title, x_label, y_label, curves: [{name, x, y, u}]}); returns what removes it. `x_is_time`:
+ * x is in ms since 1970; `names` of a curve: of its points. */
 export async function draw(place, chart) {
   await script("chart.min.js");
   const canvas = h("canvas", { role: "img", "aria-label": inWords(chart) });

@@ -1,5 +1,7 @@
 // Elements of the page. Texts are set as text, never as markup.
 
+import { localTimeParts } from "./local_time.js";
+
 /** Makes an element. `attributes`: attributes, `class`, and listeners as `onclick`. */
 export function h(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
@@ -41,6 +43,12 @@ export function fixed(value, digits) {
 /** "2026-11-26 18:30:05" (UTC) */
 export function when(rfc3339) {
   return rfc3339 ? rfc3339.slice(0, 19).replace("T", " ") : "";
+}
+
+/** A date of the server in local time, with UTC beside it. */
+export function localWhen(rfc3339) {
+  const [local, utc] = localTimeParts(Date.parse(rfc3339));
+  return h("time", { datetime: rfc3339 }, local, utc ? h("span", { class: "weak" }, utc) : null);
 }
 
 export function bytes(count) {

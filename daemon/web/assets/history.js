@@ -1,12 +1,15 @@
-// Models with verdicts, events, trends; activation and roll-back.
+// The trend of the volumetric error, models with verdicts, events, all trends; activation and roll-back.
+// Address: #history/search=WORDS&method=NAME&verdict=NAME&from=DAY&to=DAY&page=NUMBER, each part if chosen.
 
 import { ask } from "./ask.js";
-import { h, list, table, when } from "./dom.js";
+import { h, list, localWhen, table } from "./dom.js";
 import { message } from "./message.js";
+import { filterOf, hashOf, kPerPage, matching, noFilter, pageOf, verdicts } from "./model_list.js";
 import { get, listen, post, state } from "./server.js";
-import { smallChart } from "./small_charts.js";
+import { valueTrends, volumeTrend } from "./trend.js";
+import { localTime } from "./local_time.js";
 
-const SHOWN_MODELS = 200;  // newest; the others on request, because rows take the browser time
+const kShownEvents = 20;  // newest; the others on request
 
 const mayActivate = () => state.me.role === "administer";
 
@@ -22,8 +25,8 @@ async function change(path, body, done, again) {
 
 async function activate(model, active, again) {
   const why = await ask({ title: `Activate ${model.id}?`, yes: "Activate",
-    lines: [active ? `Active now: ${active.id}, added ${when(active.added)}.` : "No model is active now.",
-      `Then: ${model.id}, added ${when(model.added)}.`,
+    lines: [active ? `Active now: ${active.id}, added ${localTime(Date.parse(active.added))}.` : "No model is active now.",
+      `Then: ${model.id}, added ${localTime(Date.parse(model.added))}.`,
       ...(model.simulated ? ["It was made on simulated devices: it describes no real machine."] : []),
       ...(model.accepted ? [] : [model.judged ? "The gate refused this model: it may make the machine worse."
         : "The gate has not judged this model: it may make the machine worse."])],
@@ -36,7 +39,7 @@ async function activate(model, active, again) {
 // `active`: the model that the page shows as active. The request is refused if it is another one by now.
 async function rollBack(active, again) {
   const why = await ask({ title: "Roll back?", yes: "Roll back",
-    lines: [active ? `Active now: ${active.id}, added ${when(active.added)}.` : "No model is active now.",
+    lines: [active ? `Active now: ${active.id}, added ${localTime(Date.parse(active.added))}.` : "No model is active now.",
       "Then: the model that was active before it."],
     reason: "Reason, for the record" });
   if (why !== null) await change("api/rollback", { active: active?.id ?? "", why }, "Rolled back.", again);
@@ -52,98 +55,142 @@ function verdict(model) {
 }
 
 function modelTable(models, active, again) {
-  return table("models", ["model", "added (UTC)", "method", "machine", "verdict", "change"], models.map((m) => [
-    m.fault ? m.id : h("a", { href: `#model/${m.id}`, class: "mono" }, m.id), when(m.added), m.method,
+  return table("models", ["model", "added", "method", "machine", "verdict", "change"], models.map((m) => [
+    m.fault ? m.id : h("a", { href: `#model/${m.id}`, class: "mono" }, m.id), localWhen(m.added), m.method,
     m.machine, verdict(m),
     mayActivate() && !m.active && !m.fault
       ? h("button", { type: "button", "aria-label": `Activate ${m.id}`, onclick: () => activate(m, active, again) }, "Activate") : ""]));
 }
 
-// The newest models and the active one; `all`: whether the person asked for the others, too.
-function modelTables(models, all, again) {
-  const active = models.find((m) => m.active);
-  const shown = all.shown ? models : models.filter((m, i) => i < SHOWN_MODELS || m.active);
-  const left = models.length - shown.length;
-  const more = h("button", { type: "button",
-    onclick: () => { all.shown = true; place.replaceChildren(modelTable(models, active, again)); } },
-    `Show ${left} older models`);
-  const place = h("div", {}, modelTable(shown, active, again), left ? h("p", {}, more) : null);
-  return place;
+/** Search and filter; `changed` is called with the new filter, on its first page. */
+function filterForm(filter, methods, changed) {
+  const choice = (name, label, values, none) => h("label", {}, label,
+    h("select", { name, onchange: () => take() }, h("option", { value: "" }, none),
+      values.map((v) => h("option", { value: v, selected: v === filter[name] }, v))));
+  const day = (name, label) => h("label", {}, label,
+    h("input", { name, type: "date", value: filter[name], onchange: () => take() }));
+  const form = h("form", { class: "filter", role: "search", "aria-label": "models", onsubmit: (event) => event.preventDefault() },
+    h("label", {}, "Search", h("input", { name: "search", type: "search", value: filter.search, maxlength: 200,
+      placeholder: "model, machine, reason", oninput: () => take() })),
+    choice("method", "Method", methods, "every method"), choice("verdict", "Verdict", verdicts, "every verdict"),
+    day("from", "Added from"), day("to", "Added until"),
+    h("button", { type: "button", onclick: () => { clear(); changed(noFilter()); } }, "Show all"));
+  const clear = () => { for (const name of ["search", "method", "verdict", "from", "to"]) form.elements[name].value = ""; };
+  const take = () => changed({ ...noFilter(), search: form.elements.search.value, method: form.elements.method.value,
+    verdict: form.elements.verdict.value, from: form.elements.from.value, to: form.elements.to.value });
+  return form;
+}
+
+/** "Models 21 to 40 of 93, of 500 in all" */
+function countInWords({ page, models }, found, all) {
+  if (all === 0) return "The store has no models yet.";
+  if (found === 0) return `None of ${all} models matches.`;
+  const first = (page - 1) * kPerPage + 1;
+  return `Models ${first} to ${first + models.length - 1} of ${found}${found < all ? `, of ${all} in all` : ""}, newest first`;
+}
+
+/** The list of models with its filter and pages; returns the function that shows the answer of the server. */
+function modelList(place, again) {
+  let filter = filterOf(location.hash), answer = null, methods = null;
+  const formPlace = h("div"), tablePlace = h("div"), roll = h("div");
+  const count = h("p", { id: "model-count", role: "status" });
+  const turn = (by) => { filter.page += by; showPage(); };
+  const newer = h("button", { type: "button", onclick: () => turn(-1) }, "Newer models");
+  const older = h("button", { type: "button", onclick: () => turn(1) }, "Older models");
+  const where = h("span", {});
+  place.append(h("h2", {}, "Models"), formPlace, count, tablePlace,
+    h("div", { class: "tools", id: "model-pages" }, newer, where, older), roll);
+
+  const showPage = () => {
+    const found = matching(answer.models, filter);
+    const page = pageOf(found, filter.page);
+    filter.page = page.page;
+    globalThis.history.replaceState(null, "", hashOf(filter));
+    const active = answer.models.find((m) => m.active);
+    count.textContent = countInWords(page, found.length, answer.models.length) +
+      (answer.left_out ? `. ${answer.left_out} older ones are not listed here: abbe model list` : "");
+    tablePlace.replaceChildren(...(page.models.length ? [modelTable(page.models, active, again)] : []));
+    where.textContent = `Page ${page.page} of ${page.pages}`;
+    const focused = document.activeElement;
+    newer.disabled = page.page === 1;
+    older.disabled = page.page === page.pages;
+    // A button that is switched off loses the focus: the other one gets it.
+    if (focused === newer && newer.disabled) older.focus();
+    if (focused === older && older.disabled) newer.focus();
+  };
+  return (now) => {
+    answer = now;
+    const names = [...new Set([...now.models.map((m) => m.method), filter.method])].filter((m) => m).sort();
+    if (JSON.stringify(names) !== methods) {
+      methods = JSON.stringify(names);
+      formPlace.replaceChildren(filterForm(filter, names, (chosen) => { filter = chosen; showPage(); }));
+    }
+    showPage();
+    roll.replaceChildren(mayActivate()
+      ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(now.models.find((m) => m.active), again) }, "Roll back"))
+      : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."));
+  };
 }
 
 function eventTable(events) {
-  return table("events", ["when (UTC)", "what", "model", "who", "why"], events.map((e) =>
-    [when(e.when), e.action, h("span", { class: "mono" }, e.id), e.who, e.why]));
+  return table("events", ["when", "what", "model", "who", "why"], events.map((e) =>
+    [localWhen(e.when), e.action, h("span", { class: "mono" }, e.id), e.who, e.why]));
 }
 
-/** Each value over all accepted models, and each table of the newest ones, with their bands. */
-function trend(place, { models, values, tables }) {
-  if (models.length === 0) return;
-  const measured = models.map((m) => Date.parse(m.measured));
-  const days = measured.map((time) => (time - Math.min(...measured)) / 86400e3);
-  place.append(h("h2", {}, "Trend"), h("p", { class: "weak" },
-    `${models.length === 1 ? "One accepted model" : `${models.length} accepted models`}, over the days since the first measurement; bands: U (k = 2). ` +
-    "Values of models with different volumes or methods are comparable only with care. A click enlarges a chart."));
-  for (const group of new Set(values.map((v) => v.group)))
-    place.append(h("h3", {}, group), h("div", { class: "small-charts" },
-      values.filter((v) => v.group === group).map((v) => valueChart(v, days))));
-  if (tables.length)
-    place.append(h("h3", {}, "Tables along their axes, of the newest models"), h("div", { class: "small-charts", id: "trend-tables" },
-      tables.map((table) => tableChart(table, models))));
+/** The newest events; `all`: whether the person asked for the others, too. */
+function showEvents(place, events, all) {
+  const left = all.shown ? 0 : Math.max(0, events.length - kShownEvents);
+  const more = h("button", { type: "button", onclick: () => { all.shown = true; showEvents(place, events, all); } },
+    `Show ${left} older events`);
+  place.replaceChildren(h("h2", {}, "Events"), eventTable(left ? events.slice(0, kShownEvents) : events),
+    ...(left ? [h("p", {}, more)] : []));
 }
 
-function valueChart(v, days) {
-  const known = v.value.map((value, i) => ({ x: days[i], y: value, u: v.u[i] })).filter(({ y }) => y !== null);
-  const withU = known.every(({ u }) => u !== null);
-  const newest = known.at(-1);
-  const words = `${newest.y.toFixed(2)}${withU ? ` \u00b1 ${(2 * newest.u).toFixed(2)}` : ""} ${v.unit}`;
-  return smallChart({ title: v.name, x_label: "days since the first measurement", y_label: v.unit,
-    curves: [{ name: v.name, dots: true, x: known.map((k) => k.x), y: known.map((k) => k.y),
-      u: withU ? known.map((k) => k.u) : undefined }] }, words);
-}
-
-function tableChart(table, models) {
-  return smallChart({ title: table.name, x_label: table.x_label, y_label: table.y_label,
-    unit: table.y_label.split(", ").at(-1),
-    curves: table.curves.map((c) => ({ ...c, name: `${when(models[c.model].measured)} ${models[c.model].id}` })) });
-}
-
-const nameOf = (element) => element.getAttribute("aria-label") ?? element.textContent;
+const nameOf = (element) => element.getAttribute("aria-label") ?? element.getAttribute("name") ?? element.textContent;
 
 export async function show(place) {
-  const tables = h("div"), trends = h("div");
-  place.append(tables, trends);
+  const volume = h("div", { class: "first-chart" }), models = h("div"), events = h("div"), trends = h("div");
+  place.append(h("h2", {}, "Trend"), volume, models, events, trends);
   const all = { shown: false };
-  let shownHistory = "", trendAnswer = null, shownTrend = "";
+  let shownHistory = "", trendAnswer = null, shownTrend = "", ended = false, removeVolume = () => {};
   const fill = async () => {
     const answer = await get("api/history");
-    if (JSON.stringify(answer) === shownHistory) return;
+    if (ended || JSON.stringify(answer) === shownHistory) return;
     shownHistory = JSON.stringify(answer);
-    const { models, events } = answer;
-    const focused = tables.contains(document.activeElement) ? nameOf(document.activeElement) : null;
-    tables.replaceChildren(h("h2", {}, "Models"),
-      models.length ? modelTables(models, all, fill) : h("p", {}, "The store has no models yet."),
-      mayActivate()
-        ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(models.find((m) => m.active), fill) }, "Roll back"))
-        : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."),
-      h("h2", {}, "Events"), eventTable(events));
-    if (focused) [...tables.querySelectorAll("button, a, [tabindex]")].find((e) => nameOf(e) === focused)?.focus();
+    const focused = place.contains(document.activeElement) ? document.activeElement : null;
+    showModels(answer);
+    showEvents(events, answer.events, all);
+    if (focused && !focused.isConnected)
+      [...place.querySelectorAll("button, a, input, select, [tabindex]")].find((e) => nameOf(e) === nameOf(focused))?.focus();
   };
+  const showModels = modelList(models, fill);
   // A chart that has the focus, or is enlarged, stays; what has changed is shown when the focus leaves.
-  const showTrend = () => {
+  const showTrend = async () => {
     const text = JSON.stringify(trendAnswer);
-    if (text === shownTrend || trends.contains(document.activeElement) || document.querySelector("dialog.large")) return;
+    if (ended || text === shownTrend || trends.contains(document.activeElement) || document.querySelector("dialog.large")) return;
     shownTrend = text;
     const made = h("div");
-    trend(made, trendAnswer);
+    valueTrends(made, trendAnswer);
     trends.replaceChildren(made);
+    removeVolume();
+    removeVolume = () => {};
+    const chart = h("div");
+    volume.replaceChildren(chart);
+    const remove = await volumeTrend(chart, trendAnswer);
+    if (chart.isConnected) removeVolume = remove;
+    else remove();
   };
   const fillTrend = async () => {
     trendAnswer = await get("api/trend");
-    showTrend();
+    await showTrend();
   };
   trends.addEventListener("focusout", () => setTimeout(showTrend));  // until then nothing has the focus
   await fill();
   await fillTrend();
-  return listen("store", () => Promise.all([fill(), fillTrend()]).catch((error) => message(error.message)));
+  const unlisten = listen("store", () => Promise.all([fill(), fillTrend()]).catch((error) => message(error.message)));
+  return () => {
+    ended = true;
+    unlisten();
+    removeVolume();
+  };
 }

@@ -170,14 +170,18 @@ std::string stamp_of(const ModelStore& store) {
   return events_stamp(store) + fmt::format("{}", fmt::join(models, ""));
 }
 
-Result<std::string> history_text(const ModelStore& store) {
+Result<std::string> history_text(const ModelStore& store, std::size_t most_models) {
   const auto entries = store.list();
   ABBE_TRY(entries);
   const auto events = store.history();
   ABBE_TRY(events);
 
   json out{{"models", json::array()}, {"events", json::array()}};
-  for (const StoreEntry& entry : *entries) out["models"].push_back(entry_json(entry));
+  for (std::size_t i = 0; i < entries->size(); ++i) {
+    const StoreEntry& entry = (*entries)[i];
+    if (i < most_models || entry.active) out["models"].push_back(entry_json(entry));
+  }
+  out["left_out"] = entries->size() - out["models"].size();
   const std::size_t first = events->size() - std::min(events->size(), kMostEvents);
   for (std::size_t i = events->size(); i > first; --i)
     out["events"].push_back(event_json((*events)[i - 1]));
@@ -295,7 +299,7 @@ Result<daemon::ReportSubject> ModelViews::subject(const std::string& id) const {
 Result<std::string> ModelViews::history() {
   const ModelStore store{store_};
   return kept("history", stamp_of(store), making_history_,
-              [&store] { return history_text(store); });
+              [&] { return history_text(store, most_models_); });
 }
 
 Result<std::string> ModelViews::model(const std::string& name) {

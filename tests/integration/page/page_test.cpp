@@ -150,6 +150,30 @@ struct PageOnTheFly : Page<Spine> {
       }
     }
   }
+  /// 45 models, one a day; every fifth is refused. The newest accepted one is active.
+  void add_many_models() const {
+    auto store = daemon::ModelStore::open(file("data/models"));
+    ASSERT_TRUE(store) << store.error().text;
+    constexpr unsigned kModels = 45;
+    const protocol::UtcTime first{std::chrono::sys_days{std::chrono::year{2024} / 1 / 1}};
+    auto document = daemon::test::synthetic_document(1);
+    for (unsigned i = 1; i <= kModels; ++i) {
+      const daemon::StoreActor actor{
+          .who = "test", .why = "", .when = first + i * std::chrono::days{1}};
+      document.created = actor.when;
+      document.machine_hash = fmt::format("{}", i);  // so that each has an id of its own
+      document.method = i % 3 == 0 ? "evemu" : "otf";
+      const bool accepted = i % 5 != 0;
+      std::vector<std::string> reasons;
+      if (!accepted) reasons.push_back(fmt::format("held-out rms {} um", i));
+      document.verdict = daemon::ModelVerdict{.accepted = accepted, .reasons = reasons};
+      const auto added = store->add(document, accepted, reasons, actor);
+      ASSERT_TRUE(added) << added.error().text;
+      if (i == kModels - 1) {
+        ASSERT_TRUE(store->activate(*added, actor));
+      }
+    }
+  }
   /// As after a run that shows that the machine has changed by `what`.
   void find_drift(const std::string& what) const {
     auto store = daemon::ModelStore::open(file("data/models"));
@@ -216,6 +240,13 @@ TEST_F(PageOnTheFly, ComparesTwoModelsAndAsksBeforeAChange) {
   browse("compare.mjs", {kPassword});
   expect_browser_ends_well();
   browse("keyboard.mjs", {kPassword});
+  expect_browser_ends_well();
+}
+
+TEST_F(PageOnTheFly, ListsManyModelsInPagesThatAreSearched) {
+  ASSERT_NO_FATAL_FAILURE(add_many_models());
+  ASSERT_NO_FATAL_FAILURE(start_everything());
+  browse("history.mjs");
   expect_browser_ends_well();
 }
 

@@ -32,14 +32,22 @@ class ModelViews {
   /// Of a request for a view, while another one is made.
   static constexpr std::chrono::seconds kPatience{10};
 
+  /// Of the history, so that its answer stays below 1 MB.
+  static constexpr std::size_t kMostModels = 2000;
+
   /// `machine_hash`: of the configured machine, for which another machine's model is STALE.
-  explicit ModelViews(std::filesystem::path store, std::optional<std::string> machine_hash = {})
-      : store_(std::move(store)), machine_hash_(std::move(machine_hash)) {}
+  /// `most_models`: of the history.
+  explicit ModelViews(std::filesystem::path store, std::optional<std::string> machine_hash = {},
+                      std::size_t most_models = kMostModels)
+      : store_(std::move(store)),
+        machine_hash_(std::move(machine_hash)),
+        most_models_(most_models) {}
 
   /// Views that wait for others to be made end with an Error.
   void stop() noexcept { stopping_ = true; }
 
-  /// {"models": [newest first], "events": [newest first]}.
+  /// {"models": [newest first], "events": [newest first], "left_out"}. The models that were
+  /// added last and the active one; left_out: the number of the others.
   [[nodiscard]] daemon::Result<std::string> history();
   /// A model: verdict with reasons and notes, what it is based on, error motions with u, field of V
   /// with U, validity volume, residuals before and after, and what it does not know. `id` may be
@@ -72,6 +80,7 @@ class ModelViews {
 
   std::filesystem::path store_;
   std::optional<std::string> machine_hash_;
+  std::size_t most_models_;
   std::atomic<bool> stopping_{false};
   // One at a time, because each takes much of a processor.
   std::mutex making_model_, making_history_, making_trend_;

@@ -76,11 +76,25 @@ TEST_F(PageServerTest, ShowsWithoutALogInAndChangesNothing) {
 TEST_F(PageServerTest, ShowsNothingBeforeALogInIfSoConfigured) {
   ASSERT_NO_FATAL_FAILURE(start("view_without_login = false\n"));
   auto client = browser();
-  for (const char* path :
-       {"/api/history", "/api/status", "/events", "/api/configuration", "/recordings/a.mcap"})
+  for (const char* path : {"/api/history", "/api/status", "/api/curves/5min", "/events",
+                           "/api/configuration", "/recordings/a.mcap"})
     EXPECT_EQ(client.Get(path)->status, 401) << path;
   const auto in = log_in("view");
   EXPECT_EQ(client.Get("/api/history", in.headers)->status, 200);
+}
+
+TEST_F(PageServerTest, AnswersTheCurvesOfAWindow) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  auto client = browser();
+  const auto whole = json::parse(client.Get("/api/curves/5min")->body);
+  EXPECT_EQ(whole["step_s"], 1);
+  EXPECT_TRUE(whole["curves"].empty()) << "abbed does not run";
+  const std::int64_t last = whole["first"].get<std::int64_t>() + whole["length"].get<int>() - 1;
+  const auto rest = json::parse(client.Get("/api/curves/5min/" + std::to_string(last))->body);
+  EXPECT_EQ(rest["first"], last);
+  EXPECT_EQ(client.Get("/api/curves/2h")->status, 404);
+  for (const char* number : {"", "1x", "99999999999999999999"})
+    EXPECT_EQ(client.Get(std::string{"/api/curves/5min/"} + number)->status, 400) << number;
 }
 
 TEST_F(PageServerTest, ARoleMayDoWhatItNamesAndNoMore) {

@@ -48,7 +48,7 @@ function timeRange(curves) {
 /** An axis of local time for times in ms since 1970. */
 export function timeAxis(axis, { min, max }) {
   return { ...axis, min, max,
-    title: { ...axis.title, text: `${axis.title.text}, local time (UTC${zoneOf(max)})` },
+    title: { ...axis.title, text: [axis.title.text, `local time (UTC${zoneOf(max)})`].filter((text) => text).join(", ") },
     afterBuildTicks: (scale) => {
       scale.ticks = timeTicks(scale.min, scale.max, Math.max(2, Math.floor((scale.width || scale.maxWidth) / kTimeLabel_px)));
     },
@@ -71,12 +71,18 @@ function timeTooltip(chart) {
   };
 }
 
-function options(chart) {
+/** Makes an axis with a title in the colours of the page. */
+export function axisLook() {
   const of = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const text = of("--text");
   const grid = prefersMore() ? of("--line") : isDark() ? "#2d333b" : "#d0d7de";
-  const axis = (label) => ({ type: "linear", ticks: { color: text }, grid: { color: grid },
+  return (label) => ({ type: "linear", ticks: { color: text }, grid: { color: grid },
     title: { display: true, text: label, color: text } });
+}
+
+function options(chart) {
+  const axis = axisLook();
+  const text = axis("").title.color;
   return {
     animation: false, maintainAspectRatio: false, parsing: false,
     plugins: {

@@ -8,6 +8,7 @@ import "./signals.js";
 
 const views = {
   live: () => import("./live.js"),
+  curves: () => import("./curves.js"),
   calibration: () => import("./calibration.js"),
   model: () => import("./model.js"),
   history: () => import("./history.js"),

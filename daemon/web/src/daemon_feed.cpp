@@ -12,6 +12,7 @@
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/model/model_store.hpp"
+#include "abbe/web/curve_values.hpp"
 #include "bar_drawing.hpp"
 
 namespace abbe::web {
@@ -106,6 +107,8 @@ void DaemonFeed::ask_status() {
     for (json& stream : *streams) stream.erase("latency_counts");
   report_source({});
   board_.post(Topic::Status, event_text(*answer));
+  axes_ = answer->value("axes", json::array());
+  add_status(curves_, *answer, Clock::now());
   const json session = answer->value("session", json::object());
   const auto state = session.value("state", std::string{});
   acquiring_ = state == "acquiring";
@@ -141,6 +144,7 @@ void DaemonFeed::ask_positions() {
   }
   const json positions_m = answer->value("position_m", json::array());
   board_.post(Topic::Live, event_text(positions_m));
+  add_positions(curves_, axes_, positions_m, Clock::now());
   if (acquiring_) follow_path(positions_m);
 }
 

@@ -164,6 +164,23 @@ void answer_reading(PageContext& context, const std::string& text, httplib::Resp
   send_json(response, json::object());
 }
 
+/// "5min" or "5min/NUMBER": a window of the curves, from the bucket of this number on.
+void answer_curves(const PageContext& context, const std::string& text,
+                   httplib::Response& response) {
+  const auto slash = text.find('/');
+  std::int64_t since = 0;
+  if (slash != std::string::npos) {
+    const char* const end = text.data() + text.size();
+    const auto read = std::from_chars(text.data() + slash + 1, end, since);
+    if (read.ec != std::errc{} || read.ptr != end)
+      return send_error(response, 400, "/api/curves/WINDOW/NUMBER: the number of a bucket");
+  }
+  auto answer =
+      context.feed.curves().window(text.substr(0, slash), since, std::chrono::steady_clock::now());
+  if (!answer) return send_error(response, 404, "/api/curves/WINDOW: 5min, 1h or 8h");
+  send_text(response, 200, std::move(*answer), "application/json");
+}
+
 /// False if there is no such path.
 bool answer_data(PageContext& context, const httplib::Request& request,
                  httplib::Response& response) {
@@ -176,6 +193,8 @@ bool answer_data(PageContext& context, const httplib::Request& request,
     send_json(response, context.feed.status());
   } else if (path == "/api/calibration") {
     send_json(response, context.feed.calibration());
+  } else if (const auto window = behind(path, "/api/curves/")) {
+    answer_curves(context, *window, response);
   } else if (path == "/api/history") {
     send_result(response, context.models.history());
   } else if (path == "/api/trend") {

@@ -182,13 +182,13 @@ struct PageOnTheFly : Page<Spine> {
     ASSERT_TRUE(active && *active);
     ASSERT_TRUE(store->add_drift(**active, {.who = "test", .why = what, .when = {}}));
   }
-  void start_everything() {
+  void start_everything(int speed = kSpeed) {
     write_path("path.csv", path());
-    set_speed("sim.toml", kSpeed);
+    set_speed("sim.toml", speed);
     ASSERT_NO_FATAL_FAILURE(start_simulator());
     hold_simulator();
     write_configuration();
-    set_speed("abbed.toml", kSpeed);
+    set_speed("abbed.toml", speed);
     add_page();
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     ASSERT_NO_FATAL_FAILURE(open_server());
@@ -247,6 +247,17 @@ TEST_F(PageOnTheFly, ListsManyModelsInPagesThatAreSearched) {
   ASSERT_NO_FATAL_FAILURE(add_many_models());
   ASSERT_NO_FATAL_FAILURE(start_everything());
   browse("history.mjs");
+  expect_browser_ends_well();
+}
+
+TEST_F(PageOnTheFly, CurvesShowTheLastMinutesWithTheirGaps) {
+  ASSERT_NO_FATAL_FAILURE(start_everything(1));  // its steps are real seconds
+  simulator_->signal(SIGCONT);
+  browse("curves.mjs");
+  ASSERT_TRUE(browser_prints("SHOWN")) << browser_->out() << browser_->err();
+  EXPECT_EQ(abbed_->stop(), 0);
+  ASSERT_TRUE(browser_prints("GAP")) << browser_->out() << browser_->err();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
   expect_browser_ends_well();
 }
 

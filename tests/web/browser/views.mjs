@@ -9,7 +9,7 @@ import { clickButton, drag, goTo, logIn, middleOf, nextFrame, press, resize, say
 const [url, out, password, longest_ms] = process.argv.slice(2);
 const kTables = 14;  // that a target at a constant offset shows
 const kLooks = process.env.ABBE_PAGE_SIZE ? { [process.env.ABBE_PAGE_SIZE]: ["dark", "light"] } : { phone: ["dark"], desk: ["light"] };
-const views = ["live", "calibration", "model", "history", "recordings", "configuration"];
+const views = ["live", "curves", "calibration", "model", "history", "recordings", "configuration"];
 
 /** The first view: time from the request to the first positions. The shortest of three: what other
  * programs take from the processor is no fault of the page. */

@@ -17,6 +17,7 @@
 
 #include "abbe/base/control_connection.hpp"
 #include "abbe/config/web_config.hpp"
+#include "abbe/web/curve_history.hpp"
 #include "abbe/web/event_board.hpp"
 
 namespace abbe::web {
@@ -45,6 +46,9 @@ class DaemonFeed {
   /// request as abbed received it, lengths in m. Any thread.
   [[nodiscard]] nlohmann::json calibration() const;
 
+  /// What was answered in the last 8 h, at most twice a second while no page is open.
+  [[nodiscard]] const CurveHistory& curves() const noexcept { return curves_; }
+
   using Clock = std::chrono::steady_clock;
   /// Why abbed is not asked any more; empty: it is asked, whether it answers or not. Any thread.
   [[nodiscard]] std::string fault(Clock::time_point now) const;
@@ -67,6 +71,8 @@ class DaemonFeed {
   std::function<std::string()> notice_;
   daemon::ControlConnection connection_;
   Clock::time_point next_status_{}, next_files_{};
+  CurveHistory curves_;
+  nlohmann::json axes_ = nlohmann::json::array();  ///< of the last status
   std::string source_fault_ = "not asked yet";
   std::string files_seen_;
   /// nullopt: not posted yet. An empty notice is posted as well: a page that was open before a

@@ -143,8 +143,17 @@ class CauseSearch {
     }
   }
 
+  /// A factor that brings all positions to nearly one place would hide every difference.
   void add_units_of_positions(std::vector<CorrectedValues>& all) const {
+    constexpr double kLeastShare = 0.1;  // of the length of the table
+    const std::vector<double>& nodes_m = curve_.nodes().nodes_m;
+    const auto [first, last] = std::ranges::minmax(given_.positions_m);
+    const double least_factor = kLeastShare * (nodes_m.back() - nodes_m.front()) / (last - first);
+
     for (const UnitMistake& mistake : unit_mistakes()) {
+      if (mistake.factor < least_factor) {
+        continue;
+      }
       CorrectedValues c = given_;
       for (double& p : c.positions_m) {
         p *= mistake.factor;

@@ -4,9 +4,11 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <random>
 
 #include "abbe/calib/verify/compare.hpp"
+#include "abbe/calib/verify/expanded_uncertainty.hpp"
 #include "evemu_study.hpp"
 
 namespace abbe::calib::verify {
@@ -389,6 +391,42 @@ TEST(RatioStatistics, AreThoseOfTheSample) {
   EXPECT_DOUBLE_EQ(s.max, 1.5);
   EXPECT_EQ(s.above_1, 1u);
   EXPECT_NEAR(s.standard_deviation, 0.570087712549569, 1e-12);
+}
+
+/// The share of campaigns of `places` in which noise changes the largest residual, or the rms, by
+/// more than U.
+std::array<double, 2> share_beyond_U(std::size_t places, bool same_error_everywhere) {
+  constexpr int kCampaigns = 4000;
+  const auto U = expanded_uncertainty(1e-6, places);
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal(0.0, 1e-6);
+  std::array<double, 2> beyond{};
+
+  for (int i = 0; i < kCampaigns; ++i) {
+    double largest_m = 0.0, sum_m2 = 0.0;
+    Vector3 e = Vector3::Zero();
+    for (std::size_t place = 0; place < places; ++place) {
+      if (place == 0 || !same_error_everywhere)
+        e = {normal(random), normal(random), normal(random)};
+      largest_m = std::max(largest_m, e.norm());
+      sum_m2 += e.squaredNorm();
+    }
+    beyond[0] += largest_m > U.max_m ? 1.0 / kCampaigns : 0.0;
+    beyond[1] += std::sqrt(sum_m2 / static_cast<double>(places)) > U.rms_m ? 1.0 / kCampaigns : 0.0;
+  }
+  return beyond;
+}
+
+TEST(ExpandedUncertainty, IsExceededInFivePercentOrFewer) {
+  for (const bool same : {false, true})
+    for (const std::size_t places : {std::size_t{1}, std::size_t{20}, std::size_t{200}}) {
+      const auto [of_largest, of_rms] = share_beyond_U(places, same);
+      EXPECT_LT(of_largest, 0.06) << places << " places";
+      EXPECT_LT(of_rms, 0.06) << places << " places";
+    }
+  const auto [of_one, rms_of_one] = share_beyond_U(1, false);
+  EXPECT_GT(of_one, 0.04);
+  EXPECT_GT(rms_of_one, 0.04);
 }
 
 }  // namespace

@@ -91,6 +91,13 @@ json one_json(const Verification& v) {
   object["cut_short"] = v.cut_short;
   object["points_off"] = v.points_off;
   object["likely_mistakes"] = v.likely_mistakes;
+  object["limits"] = json::array();
+  for (const JudgedResidual& one : judged_residuals(v))
+    object["limits"].push_back({{"residual", one.name},
+                                {"value_um", one.value_um},
+                                {"U_um", one.U_um},
+                                {"limit_um", one.limit_um},
+                                {"verdict", name(one.conformity)}});
   if (const auto why = why_no_ratio(c)) {
     object["R_not_given"] = *why;
   } else {
@@ -158,6 +165,8 @@ void print_one(const Verification& v) {
                  : "the machine's axes",
              kUradPerRad * c.turned(3), kUradPerRad * c.turned(4), kUradPerRad * c.turned(5));
   print_ratios(c);
+  for (const JudgedResidual& one : judged_residuals(v))
+    fmt::print("limit       {}\n", to_text(one));
 }
 
 void print_several(const Verification& v) {
@@ -289,6 +298,9 @@ void add_options(CLI::App& command, VerifyCommand& arguments) {
       "-o,--out", arguments.out,
       "folder for report.html and grid.csv, and for verification.csv with the points of\n"
       "--recording or --live; created if needed. Several models: only verification.csv, of --live");
+  command.add_option("--details", arguments.details,
+                     "certificate.toml: [verification] with date, instrument and limits, for the\n"
+                     "report and a verdict of pass or fail (abbe example certificate.toml)");
   add_pdf_option(command, arguments.pdf);
 }
 

@@ -155,6 +155,16 @@ std::vector<std::string> contradictory_times(const ReportSubject& subject) {
   return wrong;
 }
 
+std::vector<std::string> wrong_verification_dates(const CertificateDetails& details) {
+  std::vector<std::string> wrong;
+  const std::string& day = details.verification.date;
+  if (details.now && day > day_of(*details.now + kMostAheadOfUtc))
+    wrong.push_back(fmt::format("verification.date: {} is in the future, today is {} (UTC)", day,
+                                day_of(*details.now)));
+  compare_equipment(details.equipment, EquipmentUse::Verification, "the verification", day, wrong);
+  return wrong;
+}
+
 std::vector<std::string> wrong_dates(const ReportSubject& as_found, const ReportSubject* as_left) {
   const CertificateDetails& d = as_found.details;
   std::vector<std::string> wrong = contradictory_dates(as_found, as_left);

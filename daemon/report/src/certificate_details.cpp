@@ -33,7 +33,8 @@ bool is_country_code(std::string_view text) {
 }
 
 bool is_used(const EquipmentDetails& equipment, EquipmentUse use) {
-  return equipment.use == use || equipment.use == EquipmentUse::Both;
+  const bool in_both = use == EquipmentUse::AsFound || use == EquipmentUse::AsLeft;
+  return equipment.use == use || (in_both && equipment.use == EquipmentUse::Both);
 }
 
 }  // namespace abbe::daemon

@@ -66,11 +66,12 @@ void read_equipment(Section& root, CertificateDetails& out) {
     section.get("serial", e.serial);
     section.get("certificate", e.certificate);
     read_date(section, "valid_until", e.valid_until);
-    section.get_word(
-        "used", e.use,
-        std::vector<std::pair<std::string_view, EquipmentUse>>{{"as-found", EquipmentUse::AsFound},
-                                                               {"as-left", EquipmentUse::AsLeft},
-                                                               {"both", EquipmentUse::Both}});
+    section.get_word("used", e.use,
+                     std::vector<std::pair<std::string_view, EquipmentUse>>{
+                         {"as-found", EquipmentUse::AsFound},
+                         {"as-left", EquipmentUse::AsLeft},
+                         {"both", EquipmentUse::Both},
+                         {"verification", EquipmentUse::Verification}});
     section.close();
   }
 }
@@ -88,6 +89,20 @@ void read_tolerances(Section& root, CertificateDetails& out) {
     t.limit_um_urad = t.is_angle ? limit_urad : limit_um;
     section.close();
   }
+}
+
+void read_verification(Section section, VerificationDetails& out) {
+  read_date(section, "date", out.date);
+  section.get("operator", out.operator_name);
+  read_number(section, "temperature_C", out.temperature_C, {-50.0, 100.0});
+  read_number(section, "u_um", out.u_um, kPositive);
+  read_number(section, "limit_rms_um", out.limit_rms_um, kPositive);
+  read_number(section, "limit_max_um", out.limit_max_um, kPositive);
+
+  for (const std::string_view limit : {"limit_rms_um", "limit_max_um"})
+    if (section.has(limit) && !section.has("u_um"))
+      section.fault(limit, "needs u_um, the standard uncertainty of a measured coordinate");
+  section.close();
 }
 
 }  // namespace
@@ -117,6 +132,7 @@ Result<CertificateDetails> read_certificate_toml(const std::filesystem::path& fi
   read_conditions(root.child("conditions"), details);
   read_equipment(root, details);
   read_tolerances(root, details);
+  read_verification(root.child("verification"), details.verification);
   root.close();
 
   if (faults.any()) return tl::make_unexpected(faults.to_error());

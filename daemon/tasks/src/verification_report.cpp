@@ -9,6 +9,7 @@
 
 #include "abbe/base/local_time.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/calib/verify/expanded_uncertainty.hpp"
 #include "abbe/report/html_report.hpp"
 #include "abbe/report/sections.hpp"
 
@@ -54,17 +55,63 @@ std::size_t places_improved(const verify::Comparison& c) {
   return improved;
 }
 
+/// Of the instruments that [verification] used.
+std::string instruments_of_verification(const CertificateDetails& details) {
+  std::string text;
+  for (const EquipmentDetails& e : details.equipment) {
+    if (!is_used(e, EquipmentUse::Verification)) continue;
+    if (!text.empty()) text += ", ";
+    text += e.serial.empty() ? e.name : e.name + " " + e.serial;
+  }
+  return text;
+}
+
+std::string known(const std::string& text, std::string_view key) {
+  return text.empty() ? fmt::format("not stated ({})", key) : shortened(text);
+}
+
 void add_identity(HtmlReport& page, const Verification& v) {
   const ModelDocument& document = v.models.front().model.document;
   const std::string measured = v.inputs.empty() ? "at the running machine" : v.inputs.front().name;
-  page.facts(
-      {{"machine", shortened(document.machine)},
-       {"model", model_id(document)},
-       {"model identified", local_time_text(document.created)},
-       {"measured points", shortened(measured)},
-       {"date, instrument, operator, temperature",
-        "not known: points have none (write them beside the signature)"},
-       {"limit", "not stated: neither pass nor fail (abbe report --details judges limits)"}});
+  const CertificateDetails& d = v.details;
+  const VerificationDetails& of = d.verification;
+  page.begin_columns();
+  page.facts({{"machine", shortened(document.machine)},
+              {"serial number", known(d.machine_serial, "machine.serial")},
+              {"certificate", known(d.number, "certificate.number")},
+              {"customer", known(d.customer.name, "customer.name")},
+              {"model", model_id(document)},
+              {"model identified", local_time_text(document.created)}});
+  page.facts({{"measured", known(of.date, "verification.date")},
+              {"operator", known(of.operator_name, "verification.operator")},
+              {"instrument",
+               known(instruments_of_verification(d), "equipment.name, used = \"verification\"")},
+              {"temperature", of.temperature_C ? fmt::format("{:g} C", *of.temperature_C)
+                                               : "not stated (verification.temperature_C)"},
+              {"measured points", shortened(measured)}});
+  page.end_columns();
+  page.paragraph(
+      "Keys in parentheses are those of certificate.toml: abbe verify MODEL --details "
+      "certificate.toml.");
+}
+
+void add_tolerance(HtmlReport& page, const Verification& v) {
+  page.heading("Tolerance");
+  const auto judged = judged_residuals(v);
+  if (judged.empty())
+    return page.paragraph(
+        "No limit is stated (verification.limit_rms_um, limit_max_um): neither pass nor fail.");
+
+  std::vector<std::vector<std::string>> rows;
+  for (const JudgedResidual& one : judged)
+    rows.push_back({one.name + " of the residuals with the model",
+                    fmt::format("{:.2f} \u00b1 {:.2g} um", one.value_um, one.U_um),
+                    fmt::format("{:g} um", one.limit_um), std::string{name(one.conformity)}});
+  page.table({"", "value \u00b1 U (95 %)", "limit", "verdict"}, rows);
+  page.paragraph(fmt::format(
+      "Guard band of ISO 14253-1: pass if value + U is within the limit, fail if value - U is "
+      "beyond it. U from u = {:g} um of each measured coordinate.",
+      *v.details.verification.u_um));
 }
 
 void add_verdict(HtmlReport& page, const Verification& v) {
@@ -279,6 +326,28 @@ void add_planes(HtmlReport& page, const Verification& v) {
 
 }  // namespace
 
+std::vector<JudgedResidual> judged_residuals(const Verification& v) {
+  const VerificationDetails& of = v.details.verification;
+  if (!of.u_um) return {};
+  const auto& after = v.comparison().after;
+  const auto U = verify::expanded_uncertainty(*of.u_um / kUmPerM, v.inside);
+  std::vector<JudgedResidual> judged;
+  const auto judge = [&judged](const char* name, double value_m, double U_m,
+                               const std::optional<double>& limit_um) {
+    if (!limit_um) return;
+    const double value_um = kUmPerM * value_m, U_um = kUmPerM * U_m;
+    judged.push_back({name, value_um, U_um, *limit_um, conformity_of(value_um, U_um, *limit_um)});
+  };
+  judge("rms", after.rms_m, U.rms_m, of.limit_rms_um);
+  judge("largest", after.max_m, U.max_m, of.limit_max_um);
+  return judged;
+}
+
+std::string to_text(const JudgedResidual& one) {
+  return fmt::format("{} {:.3f} um, U {:.2g} um, limit {:g} um: {}", one.name, one.value_um,
+                     one.U_um, one.limit_um, name(one.conformity));
+}
+
 std::string verdict_text(const verify::Comparison& c) {
   return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} places improved",
                      words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m,
@@ -311,8 +380,10 @@ std::string verification_report(const Verification& v) {
   page.begin_front();
   add_identity(page, v);
   add_verdict(page, v);
+  add_tolerance(page, v);
   add_left(page, v);
-  add_signature(page);
+  const CertificateDetails& d = v.details;
+  add_signature(page, d.role.empty() ? d.person : d.person + ", " + d.role, d.issue_date);
   page.end_front();
   page.page_break();
   add_farthest(page, v);

@@ -8,8 +8,11 @@
 #include "abbe/base/units.hpp"
 #include "abbe/calib/fit/points_off.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/report/calibration_certificate.hpp"
 #include "abbe/result/try.hpp"
+#include "abbe/tasks/forced_use.hpp"
 #include "abbe/tasks/vector_option.hpp"
+#include "certificate_file.hpp"
 #include "verify_points.hpp"
 
 namespace abbe::daemon {
@@ -28,6 +31,7 @@ Result<void> check_several(const VerifyArguments& arguments) {
   if (!arguments.grid.empty()) return only_one("--grid-mm");
   if (!arguments.planes.empty()) return only_one("--planes-mm");
   if (arguments.least_distance_mm) return only_one("--least-distance-mm");
+  if (!arguments.details.empty()) return only_one("--details");
   return {};
 }
 
@@ -129,6 +133,18 @@ Error with_mistakes(Error error, const std::vector<std::string>& mistakes) {
   return error;
 }
 
+/// Of --details; nothing if it is not given. BadInput for a date that cannot be.
+Result<CertificateDetails> details_of(const VerifyArguments& arguments) {
+  if (arguments.details.empty()) return CertificateDetails{};
+  auto details = read_certificate_toml(arguments.details);
+  ABBE_TRY(details);
+  details->now = actor_now({}).when;
+  auto wrong = wrong_verification_dates(*details);
+  if (wrong.empty()) return details;
+  return tl::make_unexpected(
+      Error{ErrorCode::BadInput, arguments.details + ": dates are impossible", std::move(wrong)});
+}
+
 /// One model, also on the grid.
 Result<void> compare_one(Verification& v, const VerificationFile& file,
                          const verify::Options& options) {
@@ -189,6 +205,9 @@ Result<Verification> verify_models(const VerifyArguments& arguments,
   auto models = models_of(arguments);
   ABBE_TRY(models);
   Verification v{.models = std::move(*models)};
+  auto details = details_of(arguments);
+  ABBE_TRY(details);
+  v.details = *std::move(details);
   if (!arguments.planes.empty()) {
     const auto planes = parse_mm("--planes-mm", arguments.planes);
     ABBE_TRY(planes);

@@ -102,6 +102,53 @@ TEST_F(VerifyCli, WritesAReportThatNeedsNoNetwork) {
   EXPECT_THAT(text_of(folder_ / "out/grid.csv"), StartsWith("x_mm,y_mm,z_mm,las_x_um,"));
 }
 
+TEST_F(VerifyCli, JudgesTheLimitsOfTheDetails) {
+  write("certificate.toml", R"([person]
+name = "E. Abbe"
+[[equipment]]
+name = "laser tracker"
+serial = "4711"
+used = "verification"
+[verification]
+date = "2026-11-26"
+operator = "C. Zeiss"
+u_um = 500
+limit_rms_um = 5000
+limit_max_um = 0.001
+)");
+  const auto ran =
+      abbe("verify model.json --points verification.csv --details certificate.toml -o out --json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+
+  const auto limits = nlohmann::json::parse(ran.out)["limits"];
+  ASSERT_EQ(limits.size(), 2U);
+  EXPECT_EQ(limits[0]["verdict"], "pass");
+  // The largest residual is below U: the points do not prove that the model fails.
+  EXPECT_EQ(limits[1]["verdict"], "neither");
+  EXPECT_THAT(text_of(folder_ / "out/report.html"),
+              AllOf(HasSubstr("laser tracker 4711"), HasSubstr("C. Zeiss"), HasSubstr("2026-11-26"),
+                    HasSubstr("E. Abbe"), HasSubstr("neither")));
+}
+
+TEST_F(VerifyCli, RefusesDetailsThatCannotBe) {
+  write("limit.toml", "[verification]\nlimit_rms_um = 8\n");
+  const auto without_u = abbe("verify model.json --points verification.csv --details limit.toml");
+  EXPECT_NE(without_u.exit, 0);
+  EXPECT_THAT(without_u.err, HasSubstr("limit_rms_um: needs u_um"));
+
+  write("future.toml", "[verification]\ndate = \"2999-01-01\"\n");
+  const auto future = abbe("verify model.json --points verification.csv --details future.toml");
+  EXPECT_NE(future.exit, 0);
+  EXPECT_THAT(future.err, HasSubstr("2999-01-01 is in the future"));
+
+  write("old.toml",
+        "[verification]\ndate = \"2026-11-26\"\n[[equipment]]\nname = \"tracker\"\n"
+        "used = \"verification\"\nvalid_until = \"2026-03-31\"\n");
+  const auto old = abbe("verify model.json --points verification.csv --details old.toml");
+  EXPECT_NE(old.exit, 0);
+  EXPECT_THAT(old.err, HasSubstr("valid until 2026-03-31"));
+}
+
 /// A grid in the volume of the model, measured without noise.
 std::vector<calib::verify::MeasuredPoint> points_of(const ModelDocument& document) {
   std::vector<calib::verify::MeasuredPoint> points;
@@ -234,7 +281,7 @@ TEST_F(VerifyCli, StatesShotsAndPlaces) {
   auto points = points_of(document);
   for (int i = 0; i < 5; ++i) {
     points.push_back(points[7]);
-    points.back().measured_m.x() += 1e-6 * i;
+    points.back().measured_m.x() += 1e-6 * (i + 1);
   }
   write("shots.csv", to_verification_csv(points));
   const auto ran = abbe("verify tables.json --points shots.csv -o out");

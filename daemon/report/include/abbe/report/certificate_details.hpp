@@ -16,15 +16,16 @@ struct Contact {
   std::string country{};  ///< ISO 3166-1, two capital letters
 };
 
-/// With which measurement an instrument was used: that of MODEL, as found, or that of `--as-left`.
-enum class EquipmentUse { AsFound, AsLeft, Both };
+/// With which measurement an instrument was used: that of MODEL, as found, that of `--as-left`, or
+/// both; or the independent measurement of a verification.
+enum class EquipmentUse { AsFound, AsLeft, Both, Verification };
 
 struct EquipmentDetails {
   std::string name, manufacturer, model, serial, certificate;
   std::string valid_until{};  ///< last day of its calibration, "2027-03-31"
   EquipmentUse use = EquipmentUse::AsFound;
 };
-/// True if the instrument was used as found, or as left.
+/// True if the instrument was used with that measurement.
 [[nodiscard]] bool is_used(const EquipmentDetails& equipment, EquipmentUse use);
 
 /// The largest size that a value of the report may have.
@@ -32,6 +33,17 @@ struct ToleranceDetails {
   std::string value;         ///< CertifiedValue::key: "X.M", "EC0Y", "U.max"
   double limit_um_urad = 0;  ///< um, of an angle urad; positive
   bool is_angle = false;     ///< the limit was given in urad
+};
+
+/// The independent measurement of a verification: its file has none of this.
+struct VerificationDetails {
+  std::string date{};           ///< as in ISO 8601, local
+  std::string operator_name{};  ///< who measured
+  std::optional<double> temperature_C{};
+  /// Standard uncertainty of each coordinate of a measured point, k = 1. A limit needs it.
+  std::optional<double> u_um{};
+  /// The largest residuals that are permitted with the model. Absent: no statement of conformity.
+  std::optional<double> limit_rms_um{}, limit_max_um{};
 };
 
 struct CertificateDetails {
@@ -47,6 +59,7 @@ struct CertificateDetails {
   std::optional<double> temperature_C, u_temperature_K, humidity_percent, feed_mm_per_min;
   std::vector<EquipmentDetails> equipment;
   std::vector<ToleranceDetails> tolerances{};  ///< empty: no statement of conformity
+  VerificationDetails verification{};
   /// When the certificate is made: later dates of issue and identification are refused. nullopt:
   /// not known.
   std::optional<protocol::UtcTime> now{};

@@ -10,6 +10,8 @@
 
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/verify/compare.hpp"
+#include "abbe/report/certificate_details.hpp"
+#include "abbe/report/conformity.hpp"
 #include "abbe/tasks/same_machine.hpp"
 
 namespace abbe::daemon {
@@ -41,6 +43,7 @@ struct Verification {
   /// Positions of the planes in which the vectors are drawn, one coordinate per axis; default: the
   /// middle of the grid.
   std::optional<calib::Vector3> planes_m;
+  CertificateDetails details{};  ///< of certificate.toml; empty: not given
 
   /// Of the first model.
   [[nodiscard]] const calib::verify::Comparison& comparison() const {
@@ -59,6 +62,18 @@ struct Verification {
 /// Why the report does not give R_resmag (residual / error without compensation); nullopt if it
 /// does.
 [[nodiscard]] std::optional<std::string> why_no_ratio(const calib::verify::Comparison&);
+
+/// A residual of the first model beside its limit of `[verification]`. Lengths in um.
+struct JudgedResidual {
+  std::string name;  ///< "rms", "largest"
+  double value_um = 0.0, U_um = 0.0, limit_um = 0.0;
+  Conformity conformity = Conformity::Neither;
+};
+/// With the guard band of ISO 14253-1, and U of calib::verify::expanded_uncertainty(). Empty: no
+/// limits are stated.
+[[nodiscard]] std::vector<JudgedResidual> judged_residuals(const Verification&);
+/// "rms 3.214 um, U 2.8 um, limit 8 um: pass"
+[[nodiscard]] std::string to_text(const JudgedResidual&);
 
 /// The text of report.html of the first model, a page that needs no other file and begins with the
 /// verdict.

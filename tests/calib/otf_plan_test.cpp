@@ -54,6 +54,24 @@ TEST(OtfPlan, IsBetterThanTheBasePathAndNoLongerThanItsBudget) {
   EXPECT_TRUE(check(planned->path, few_nodes().machine.nodes));
 }
 
+TEST(OtfPlan, GivesThePathFoundSoFarWhenThatIsEnough) {
+  PlanOptions options{.lattice = 3, .exchanges = 300};
+  std::size_t reports = 0;
+  options.progress = [&reports](double, double) { ++reports; };
+  options.enough = [&reports] { return reports >= 2; };
+  const auto planned = plan(few_nodes(), {.length_m = kLength_m}, options);
+  ASSERT_TRUE(planned) << planned.error().text;
+  EXPECT_TRUE(planned->ended_early);
+  EXPECT_FALSE(exchanged()->ended_early);
+  EXPECT_LT(planned->rms_u_m, planned->walk_rms_u_m);
+  EXPECT_GT(planned->rms_u_m, exchanged()->rms_u_m);
+
+  options.enough = [] { return true; };
+  const auto at_once = plan(few_nodes(), {.length_m = kLength_m}, options);
+  ASSERT_TRUE(at_once) << at_once.error().text;
+  EXPECT_EQ(at_once->path.vertices_m, walked()->path.vertices_m);
+}
+
 TEST(OtfPlan, EstimateIsThePredictedUncertainty) {
   const auto& planned = walked();
   ASSERT_TRUE(planned) << planned.error().text;

@@ -7,6 +7,7 @@
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -23,6 +24,7 @@
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/plan_otf.hpp"
 #include "commands.hpp"
+#include "interruption.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -119,6 +121,7 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
   for (const auto& table : plan.prediction.backlash)
     print_uncertainty(table.name + ".backlash", table);
   if (!plan.prediction.unused.empty()) fmt::print("note        {}\n", plan.prediction.unused);
+  if (plan.ended_early) fmt::print("note        Ctrl-C: this is the path found so far\n");
   if (plan.corners_not_reached > 0)
     fmt::print(
         "note        {} corners of the travel are not reached: the model is not valid "
@@ -129,6 +132,7 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
 
 int run(const PlanOtfCommand& arguments) {
   ProgressBar bar(!arguments.json);
+  mark_interruptions({SIGINT});
   const auto plan = plan_otf(arguments, bar.progress());
   bar.clear();
   if (!plan) return report(plan.error());
@@ -191,13 +195,15 @@ void add_drive_options(CLI::App& command, PlanOtfCommand& arguments) {
 
 void add_plan_otf(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<PlanOtfCommand>();
+  arguments->enough = interrupted;
   auto* command = parent.add_subcommand(
       "otf",
       "Plan the path of an on-the-fly calibration: the path with the smallest predicted "
       "uncertainty\n"
       "for its length, beside the usual path of edges and diagonals. Writes path.csv, map.csv,\n"
       "plan.json and programs for the control to OUT. White noise is predicted, and an offset of\n"
-      "the ranges ([tracker] u_range_offset_um); turbulence adds to it.");
+      "the ranges ([tracker] u_range_offset_um); turbulence adds to it. The first path is there\n"
+      "after seconds and becomes better by a few per cent; Ctrl-C takes the one found so far.");
   add_machine_options(*command, *arguments);
   command
       ->add_option(

@@ -128,14 +128,21 @@ Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& pro
       ABBE_TRY(compared);
       plan.trackers = *std::move(compared);
     }
-    const auto best =
-        otf::plan(plan.run, budget,
-                  {.lattice = arguments.lattice,
-                   .exchanges = arguments.exchanges,
-                   .progress = [&](double share) { progress.show("planning", share); }});
+    progress.show("first path", 0.0);
+    const auto best = otf::plan(
+        plan.run, budget,
+        {.lattice = arguments.lattice,
+         .exchanges = arguments.exchanges,
+         .stopped = [&progress] { return progress.stopped(); },
+         .enough = arguments.enough,
+         .progress =
+             [&progress](double share, double rms_u_m) {
+               progress.show(fmt::format("{:.4f} um; Ctrl-C takes it", rms_u_m * kUmPerM), share);
+             }});
     if (!best) return tl::make_unexpected(error_of(best.error()));
     plan.path = best->path;
     plan.corners_not_reached = best->corners_not_reached;
+    plan.ended_early = best->ended_early;
   }
 
   const auto prediction = otf::predict(plan.path, plan.run);

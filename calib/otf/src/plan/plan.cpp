@@ -111,7 +111,10 @@ Result<Path> improved(const PlanProblem& problem, Path path, std::span<const Vec
   constexpr std::size_t kSteps = 40;
   const PlannedRun& run = problem.run();
   return exchange_vertices(problem, std::move(path), lattice, budget, options)
-      .and_then([&](const Path& exchanged) {
+      .and_then([&](const Path& exchanged) -> Result<Path> {
+        if (is_enough(options)) {
+          return exchanged;
+        }
         const double most_m =
             most_before_rounding_m(budget, run.drive, exchanged.vertices_m.size() - 1);
         return descend(problem, exchanged, fixed_vertices(exchanged, run.machine.nodes), most_m,
@@ -156,6 +159,7 @@ Result<PlannedPath> plan(const PlannedRun& run, const PathBudget& budget,
   return PlannedPath{.path = *path,
                      .walk_rms_u_m = std::sqrt(walk_value),
                      .rms_u_m = std::sqrt(problem.state_of(*path).value_m2),
+                     .ended_early = options.exchanges > 0 && is_enough(options),
                      .corners_not_reached = kCorners - corners_reached(*path, nodes)};
 }
 

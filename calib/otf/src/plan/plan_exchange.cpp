@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <utility>
@@ -305,6 +306,9 @@ Result<Path> exchange_vertices(const PlanProblem& problem, Path path,
 
     for (std::size_t i = 0; i < found.size() && evaluated < most && done.size() < kAccepted; ++i) {
       ABBE_TRY(check_stopped(options.stopped));
+      if (is_enough(options)) {
+        return path;
+      }
       Exchange e = found[i];
       if (!std::all_of(done.begin(), done.end(), [&](const Exchange& d) { return adapt(e, d); }) ||
           !failed.insert(key_of(path, e)).second) {
@@ -326,7 +330,8 @@ Result<Path> exchange_vertices(const PlanProblem& problem, Path path,
     }
 
     if (options.progress) {
-      options.progress(static_cast<double>(evaluated) / static_cast<double>(options.exchanges));
+      options.progress(static_cast<double>(evaluated) / static_cast<double>(options.exchanges),
+                       std::sqrt(state.value_m2));
     }
     of_earlier_paths = of_earlier_paths || !done.empty();
     if (done.empty() && evaluated < most) {

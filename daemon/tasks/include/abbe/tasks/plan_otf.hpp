@@ -2,6 +2,7 @@
 /// A path for a calibration on the fly, planned or given, with the uncertainty that it will give.
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -27,6 +28,8 @@ struct PlanOtfArguments {
   calib::otf::Drive drive;
   std::size_t lattice = calib::otf::PlanOptions{}.lattice,
               exchanges = calib::otf::PlanOptions{}.exchanges;
+  /// True: the path found so far is the result. Empty: never.
+  std::function<bool()> enough{};
 };
 
 /// A path with its prediction, and the tracker positions that were compared.
@@ -37,6 +40,7 @@ struct PathPlan {
   tl::expected<calib::otf::Prediction, calib::Error> base;
   std::vector<std::pair<calib::Vector3, double>> trackers;  ///< position, rms_u_m
   std::size_t corners_not_reached = 0;
+  bool ended_early = false;  ///< by PlanOtfArguments::enough
 };
 
 /// With `arguments.path` a prediction of that path, else a new path. Usage: the place of the

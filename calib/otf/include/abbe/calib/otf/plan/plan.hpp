@@ -41,14 +41,18 @@ struct PlanOptions {
   /// alone. The bound of the reference machine falls from 0.0847 um to 0.0829 um with 7,000, to
   /// 0.0819 um with 12,000 and to 0.0815 um with 18,000.
   std::size_t exchanges = 12'000;
-  Stopped stopped = {};                       ///< as Options::stopped
-  std::function<void(double)> progress = {};  ///< 0 to 1
+  Stopped stopped = {};  ///< as Options::stopped
+  /// True: exchange and descent end, and the path found so far is the result. Empty: never.
+  Stopped enough = {};
+  /// Share of the exchanges, 0 to 1, and the estimate of the path found so far.
+  std::function<void(double share, double rms_u_m)> progress = {};
 };
 
 struct PlannedPath {
   Path path;
   double walk_rms_u_m = 0.0;  ///< estimate after the walk
   double rms_u_m = 0.0;       ///< estimate at the end; predict() states the value of a run
+  bool ended_early = false;   ///< PlanOptions::enough was true
   /// Corners of the travel that the path does not reach. Its model is not valid there.
   std::size_t corners_not_reached = 0;
 };

@@ -106,7 +106,7 @@ class Recording:
 
 def otf_task(path: str) -> str:
     """The request for a calibration on the fly along the path of path.csv, as JSON. For abbe.Control."""
-def evemu_task(calibrator: str, rotation_reference: str | None = None, u_reference_m: float = 1e-6) -> str:
+def evemu_task(calibrator: str, rotation_reference: str | None = None, u_reference_m: float | None = None) -> str:
     """The request for a calibration with the ball array of calibrator.toml, as JSON. For abbe.Control."""
 def mfb_task(bar: str, plan: str) -> str:
     """The request for a calibration with the bar of bar.toml by plan.toml, as JSON. For abbe.Control."""
@@ -125,7 +125,7 @@ def identify_otf(*, machine: str | None = None, path: str | None = None, tracker
     """`abbe identify otf`; targets: "X,Y,Z=FILE" in mm, one per run."""
 def identify_evemu(*, machine: str | None = None, touches: str | None = None,
                    calibrator: str | None = None, errors: str | None = None,
-                   recording: str | None = None, rotation_reference: str | None = None, u_reference_um: float = 1.0,
+                   recording: str | None = None, rotation_reference: str | None = None, u_reference_um: float | None = None,
                    artefact_C: float | None = None, u_artefact_K: float | None = None,
                    estimator: str | None = None, folds: str | None = None,
                    order: int | None = None, scales_corrected: bool = False,

@@ -57,12 +57,12 @@ class Control:
         return self._calibrate(task, mode=mode)
 
     def calibrate_evemu(self, calibrator: File, *, rotation_reference: File | None = None,
-                        u_reference_m: float = 1e-6, points_per_ball: int | None = None,
+                        u_reference_m: float | None = None, points_per_ball: int | None = None,
                         points_per_block: int | None = None) -> dict[str, Any]:
         """Begins a calibration with the ball array of calibrator.toml.
 
         rotation_reference: file errors.csv of points where V is known independently, with the standard
-        uncertainty u_reference_m. "next" of the session is the next touch.
+        uncertainty u_reference_m, which it needs. "next" of the session is the next touch.
         """
         reference = None if rotation_reference is None else os.fspath(rotation_reference)
         return self._calibrate(json.loads(_abbe.evemu_task(os.fspath(calibrator), reference, u_reference_m)),

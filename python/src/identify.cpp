@@ -205,10 +205,10 @@ void bind_identify_touches(py::module_& module) {
   module.def(
       "identify_evemu",
       [](const Text& machine, const Text& touches, const Text& calibrator, const Text& errors,
-         const Text& recording, const Text& rotation_reference, double u_reference_um,
-         std::optional<double> artefact_C, std::optional<double> u_artefact_K,
-         const Text& estimator, const Text& folds, std::optional<int> order, bool scales_corrected,
-         const Text& compare_with) {
+         const Text& recording, const Text& rotation_reference,
+         std::optional<double> u_reference_um, std::optional<double> artefact_C,
+         std::optional<double> u_artefact_K, const Text& estimator, const Text& folds,
+         std::optional<int> order, bool scales_corrected, const Text& compare_with) {
         daemon::IdentifyEvemuArguments arguments;
         arguments.input.machine = text_or_empty(machine);
         arguments.input.touches = text_or_empty(touches);
@@ -229,7 +229,7 @@ void bind_identify_touches(py::module_& module) {
       py::kw_only(), py::arg("machine") = py::none(), py::arg("touches") = py::none(),
       py::arg("calibrator") = py::none(), py::arg("errors") = py::none(),
       py::arg("recording") = py::none(), py::arg("rotation_reference") = py::none(),
-      py::arg("u_reference_um") = 1.0, py::arg("artefact_C") = py::none(),
+      py::arg("u_reference_um") = py::none(), py::arg("artefact_C") = py::none(),
       py::arg("u_artefact_K") = py::none(), py::arg("estimator") = py::none(),
       py::arg("folds") = py::none(), py::arg("order") = py::none(),
       py::arg("scales_corrected") = false, py::arg("compare_with") = py::none());

@@ -31,12 +31,15 @@ std::string otf_task(const std::string& path) {
 }
 
 std::string evemu_task(const std::string& calibrator,
-                       const std::optional<std::string>& rotation_reference, double u_reference_m) {
+                       const std::optional<std::string>& rotation_reference,
+                       std::optional<double> u_reference_m) {
+  if (rotation_reference && !u_reference_m)
+    throw py::value_error("rotation_reference needs u_reference_m, the standard uncertainty of V");
   const auto array = value_or_raise(daemon::read_calibrator_toml(calibrator));
   std::optional<daemon::BallErrorsFile> reference;
   if (rotation_reference) reference = value_or_raise(daemon::read_errors_csv(*rotation_reference));
   return daemon::json_text(
-      daemon::evemu_task(array, reference ? &*reference : nullptr, u_reference_m));
+      daemon::evemu_task(array, reference ? &*reference : nullptr, u_reference_m.value_or(0.0)));
 }
 
 daemon::MfbRequest::File with_text(const std::string& file) {
@@ -56,7 +59,7 @@ std::string mfb_task(const std::string& bar, const std::string& plan) {
 void bind_tasks(py::module_& module) {
   module.def("otf_task", &otf_task, py::arg("path"));
   module.def("evemu_task", &evemu_task, py::arg("calibrator"),
-             py::arg("rotation_reference") = py::none(), py::arg("u_reference_m") = 1e-6);
+             py::arg("rotation_reference") = py::none(), py::arg("u_reference_m") = py::none());
   module.def("mfb_task", &mfb_task, py::arg("bar"), py::arg("plan"));
 }
 

@@ -24,7 +24,7 @@ namespace {
 struct CalibrateEvemuArguments {
   FollowOptions follow;
   std::string calibrator, rotation_reference;
-  double u_reference_um = 1.0;
+  double u_reference_um = 0.0;
   std::size_t points_per_ball = 0, points_per_block = 0;  // 0: from the daemon's configuration
 };
 
@@ -66,12 +66,14 @@ void add_calibrate_evemu(CLI::App& parent, int& exit) {
   auto* calibrator = command->add_option("--calibrator", arguments->calibrator, "calibrator.toml");
   auto* reference = command->add_option(
       "--rotation-reference", arguments->rotation_reference,
-      "errors.csv of points where V is known independently: the model is rotated to fit them");
-  command
-      ->add_option("--u-reference-um", arguments->u_reference_um, "standard uncertainty of that V")
-      ->needs(reference)
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      "errors.csv of points where V is known independently: the model is rotated to fit them;\n"
+      "needs --u-reference-um");
+  auto* u_reference = command
+                          ->add_option("--u-reference-um", arguments->u_reference_um,
+                                       "standard uncertainty of that V")
+                          ->needs(reference)
+                          ->check(CLI::PositiveNumber);
+  reference->needs(u_reference);
   command
       ->add_option("--points-per-ball", arguments->points_per_ball,
                    "default: [evemu] of the daemon")

@@ -220,14 +220,15 @@ void add_options(CLI::App& command, IdentifyEvemuCommand& arguments) {
       .add_flag("--rotation-known", input.rotation_known,
                 "the directions of the errors do not come from the artefact's blocks")
       ->needs(errors);
-  command.add_option(
+  auto* reference = command.add_option(
       "--rotation-reference", input.rotation_reference,
-      "errors.csv of points where V is known independently: the model is rotated to fit them");
-  command
-      .add_option("--u-reference-um", input.u_reference_um,
-                  "standard uncertainty of the reference's V")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      "errors.csv of points where V is known independently: the model is rotated to fit them;\n"
+      "needs --u-reference-um");
+  auto* u_reference = command
+                          .add_option("--u-reference-um", input.u_reference_um,
+                                      "standard uncertainty of the reference's V")
+                          ->check(CLI::PositiveNumber);
+  reference->needs(u_reference);
   command.add_flag(
       "--accept-shape-only", arguments.accept_shape_only,
       "do not refuse the model because its rotation about Ball1 is unknown; as [gate] accept =\n"

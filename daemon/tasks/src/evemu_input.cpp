@@ -178,12 +178,15 @@ Result<EvemuInput> read_evemu_input(const EvemuInputArguments& arguments,
 
 Result<void> read_rotation_reference(const EvemuInputArguments& arguments, EvemuInput& input) {
   if (arguments.rotation_reference.empty()) return {};
+  if (!arguments.u_reference_um || !(*arguments.u_reference_um > 0.0))
+    return fail(ErrorCode::Usage,
+                "--rotation-reference needs --u-reference-um, the standard uncertainty of its V");
   const auto points = read_errors_csv(arguments.rotation_reference);
   ABBE_TRY(points);
   ABBE_TRY(check_travel(arguments.rotation_reference, positions_of(points->errors), points->lines,
                         input.config.machine));
   input.sources.push_back(points->source);
-  input.rotation_reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
+  input.rotation_reference = RotationPoints{points->errors, *arguments.u_reference_um / kUmPerM};
   return {};
 }
 

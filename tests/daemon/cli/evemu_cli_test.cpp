@@ -539,6 +539,15 @@ TEST_F(EvemuCli, NeedsTouchesOrErrors) {
   EXPECT_EQ(abbe("identify evemu --machine machine.toml --touches touches.csv -o out").exit, 2);
 }
 
+TEST_F(EvemuCli, ARotationReferenceNeedsItsUncertainty) {
+  for (const char* command : {"identify evemu --machine machine.toml --errors errors.csv -o out ",
+                              "calibrate evemu --calibrator calibrator.toml "}) {
+    const auto ran = abbe(std::string(command) + "--rotation-reference errors.csv");
+    EXPECT_EQ(ran.exit, 2);
+    EXPECT_THAT(ran.err, HasSubstr("--u-reference-um")) << command;
+  }
+}
+
 TEST_F(EvemuCli, RefusesACalibratorWithEveryFaultNamed) {
   write("calibrator.toml",
         "[calibrator]\nname = \"x\"\n[[ball]]\nnumber = 1\nx_mm = 0\ny_mm = 0\nz_mm = 0\nr = 3\n");

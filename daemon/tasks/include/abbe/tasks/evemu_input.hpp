@@ -23,7 +23,7 @@ struct EvemuInputArguments {
   std::string machine, touches, calibrator, errors, recording, rotation_reference;
   std::optional<int> order, positions;             ///< without a value: that of [evemu]
   std::optional<double> artefact_C, u_artefact_K;  ///< both or none
-  double u_reference_um = 1.0;
+  std::optional<double> u_reference_um{};          ///< required with rotation_reference
   bool rotation_known = false, scales_corrected = false;
   std::optional<calib::Vector3> tip_offset_m{};  ///< without a value: [target] offset_mm
 };

@@ -36,7 +36,7 @@ std::string remaining_time(const nlohmann::json& session) {
 std::string state_in_words(const nlohmann::json& session) {
   const auto state = session.at("state").get<std::string>();
   if (state == "idle") return "not running";
-  if (state == "warming") return "start";
+  if (state == "warming") return "before the start";
   if (state == "active") return "has ended: accepted";
   return state == "refused" ? "has ended: refused" : state;
 }

@@ -11,8 +11,7 @@ namespace abbe::daemon {
 /// has no remaining time: it is not known yet, or the daemon is an older version.
 [[nodiscard]] std::string remaining_time(const nlohmann::json& session);
 
-/// The state for people: "start" for "warming", which the messages call the time before a run;
-/// "has ended: accepted".
+/// The state for people: "before the start" for "warming", "has ended: accepted".
 [[nodiscard]] std::string state_in_words(const nlohmann::json& session);
 
 /// What is to be said of the session, one sentence each: the verdict with reasons and notes, or why

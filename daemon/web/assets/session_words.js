@@ -3,14 +3,14 @@
 export const running = (session) => ["warming", "acquiring", "identifying", "judged"].includes(session.state);
 
 const kStates = {
-  idle: "not running", warming: "start", acquiring: "acquiring", identifying: "identifying",
+  idle: "not running", warming: "before the start", acquiring: "acquiring", identifying: "identifying",
   judged: "judging", active: "has ended: model accepted", refused: "has ended: refused",
 };
 const kMethods = { otf: "on the fly", evemu: "ball array", mfb: "Multi-Feature Bar" };
 
 export const methodInWords = (session) => kMethods[session.method] ?? session.method;
 
-/** "start", "acquiring 40 %", "READY: drive now". */
+/** "before the start", "acquiring 40 %", "READY: drive now". */
 export function stateInWords(session) {
   if (session.start?.ready) return "READY: drive now";
   if (session.start?.missed) return "start missed";

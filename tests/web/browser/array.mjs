@@ -82,7 +82,7 @@ await withPage(url, out, async (context) => {
   await waitForText(context, "choose a file", "#message");  // none was chosen
   await chooseFile(context, "#calibrator-file", calibrator);
   await clickButton(context, "Begin");
-  await waitForText(context, "Calibration: start", "#session-state");
+  await waitForText(context, "Calibration: before the start", "#session-state");
   await waitForText(context, "Next: ball 1", "#view");
   await page.waitForFunction(() => document.querySelector(".space")?.dataset.next === "ball 1");
   const faults = await violations(context);

@@ -24,7 +24,7 @@ await withPage(url, out, async (context) => {
   await goTo(context, "calibration");
   await chooseFile(context, "#path-file", path);
   await clickButton(context, "Begin");
-  await waitForText(context, "Calibration: start", "#session-state");
+  await waitForText(context, "Calibration: before the start", "#session-state");
   await page.waitForSelector(".space canvas");
   // The devices are held until the machine may move: what the start needs is listed as missing.
   await page.waitForSelector('#start li[data-name="tracker"][data-met="false"]');

@@ -211,14 +211,16 @@ async function arrayDrawing(place, features, frame, arm = [-0.5, -1, 0.6]) {
   const margin = 2 * features.radius;
   const [low, high] = corners(features.all.map((f) => f.at));
   const space = await Space.create(place, low.map((x) => x - margin), high.map((x) => x + margin), "Ball array", arm);
-  for (const f of features.all)
-    space.text(f.name, new THREE.Vector3(f.at[0], f.at[1], f.at[2] + 2.2 * (f.radius ?? f.side / 2)));
+  const names = new Map(features.all.map((f) => [f.on,
+    space.text(f.name, new THREE.Vector3(f.at[0], f.at[1], f.at[2] + 2.2 * (f.radius ?? f.side / 2)))]));
   space.frame.dataset.frame = frame;
   let drawn = [], tip = null;
   const mark = ({ all, posed }, touches) => {
     drawn.forEach((object) => space.remove(object));
     drawn = all.map((f) => {
       const isNext = f.on === touches.next?.on;
+      const name = names.get(f.on);
+      if (name) name.userData.first = isNext;
       const role = isNext ? "next" : f.state === "open" ? "open" : "touched";
       const outline = !isNext && f.state !== "touched", larger = isNext ? 1.3 : 1;
       return f.normal ? space.plate(f.at, f.normal, larger * f.side, role, outline)

@@ -55,9 +55,9 @@ function verdict(model) {
 }
 
 function modelTable(models, active, again) {
-  return table("models", ["model", "added", "method", "machine", "verdict", "change"], models.map((m) => [
-    m.fault ? m.id : h("a", { href: `#model/${m.id}`, class: "mono" }, m.id), localWhen(m.added), m.method,
-    m.machine, verdict(m),
+  return table("models", ["model", "verdict", "added", "method", "machine", "change"], models.map((m) => [
+    m.fault ? m.id : h("a", { href: `#model/${m.id}`, class: "mono" }, m.id), verdict(m), localWhen(m.added),
+    m.method, m.machine,
     mayActivate() && !m.active && !m.fault
       ? h("button", { type: "button", "aria-label": `Activate ${m.id}`, onclick: () => activate(m, active, again) }, "Activate") : ""]));
 }

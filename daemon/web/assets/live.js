@@ -29,14 +29,16 @@ function streamRow(stream) {
   return [
     h("th", { scope: "row" }, stream.name),
     h("span", { class: good }, stream.state),
+    h("td", { class: "sentence" }, [stream.condition, stream.last_fault].filter(Boolean).join("; ")),
     fixed(stream.rate_hz, 1), String(stream.samples), String(stream.dropped), String(stream.gaps),
-    String(stream.faults ?? 0), [stream.condition, stream.last_fault].filter(Boolean).join("; "),
+    String(stream.faults ?? 0),
   ];
 }
 
-const streamColumns = ["stream", "state", { title: "rate, 1/s", number: true },
+// What a telephone shows without scrolling comes first.
+const streamColumns = ["stream", "state", "last fault", { title: "rate, 1/s", number: true },
   { title: "samples", number: true }, { title: "dropped", number: true },
-  { title: "gaps", number: true }, { title: "faults", number: true }, "last fault"];
+  { title: "gaps", number: true }, { title: "faults", number: true }];
 
 function environment(status) {
   const e = status.environment;

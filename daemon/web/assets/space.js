@@ -4,10 +4,12 @@
 
 import { script } from "./charts.js";
 import { h } from "./dom.js";
+import { withoutOverlap } from "./labels.js";
 import { onPalette, palette } from "./palette.js";
 
 const kFov = 40;  // degrees, vertical
 const kLeastAspect = 1.2;  // in which the box is seen from all sides
+const kFont = "48px sans-serif";
 
 async function load() {
   await script("three.min.js");
@@ -25,11 +27,18 @@ function paint(material, role) {
 function picture(words) {
   const canvas = h("canvas", { width: 256, height: 64 });
   const pen = canvas.getContext("2d");
-  pen.font = "48px sans-serif";
+  pen.font = kFont;
   pen.fillStyle = palette().text;
   pen.textAlign = "center";
   pen.fillText(words, 128, 48);
   return new THREE.CanvasTexture(canvas);
+}
+
+/** Width of a text as a share of its picture. */
+function widthOf(words) {
+  const pen = h("canvas").getContext("2d");
+  pen.font = kFont;
+  return Math.min(1, pen.measureText(words).width / 256);
 }
 
 /** Colours are names of palette(): they follow theme and contrast. */
@@ -49,6 +58,7 @@ export class Space {
     this.name(label);
     place.append(this.frame);
     this.scene = new THREE.Scene();
+    this.texts = [];
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.frame.append(this.renderer.domElement);
@@ -152,13 +162,33 @@ export class Space {
     this.text(name, at);
   }
 
-  /** A text that always faces the viewer. */
+  /** A text that always faces the viewer. Of texts that overlap the one is shown whose userData.first
+   * is true, else the nearest. */
   text(words, at) {
     const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: picture(words), depthTest: false }));
-    sprite.userData.words = words;
+    Object.assign(sprite.userData, { words, width: widthOf(words), first: false });
     sprite.scale.set(0.24 * this.size, 0.06 * this.size, 1);
     sprite.position.copy(at);
+    this.texts.push(sprite);
     return this.add(sprite);
+  }
+
+  /** Where a text is in the view, in pixels; `depth`: distance from the viewer, mm. */
+  #rectangleOf(sprite) {
+    const { clientWidth, clientHeight } = this.frame;
+    const depth = -sprite.position.clone().applyMatrix4(this.camera.matrixWorldInverse).z;
+    const at = sprite.position.clone().project(this.camera);
+    const perUnit = clientHeight / (2 * depth * Math.tan(this.camera.fov / 2 * Math.PI / 180));
+    return { sprite, depth, first: sprite.userData.first, x: (at.x + 1) / 2 * clientWidth, y: (1 - at.y) / 2 * clientHeight,
+      width: sprite.userData.width * sprite.scale.x * perUnit, height: 0.8 * sprite.scale.y * perUnit };
+  }
+
+  /** Hides the texts that another one would cover. */
+  #placeTexts() {
+    this.camera.updateMatrixWorld();
+    const shown = withoutOverlap(this.texts.map((sprite) => this.#rectangleOf(sprite)));
+    const sprites = new Set(shown.map(({ sprite }) => sprite));
+    this.texts.forEach((sprite) => { sprite.visible = sprites.has(sprite); });
   }
 
   add(object) {
@@ -249,6 +279,7 @@ export class Space {
     if (this.drawing) return;
     this.drawing = requestAnimationFrame(() => {
       this.drawing = 0;
+      this.#placeTexts();
       this.renderer.render(this.scene, this.camera);
     });
   }

@@ -186,9 +186,9 @@ TEST_F(ProbeLines, ReportsColumnsThatDoNotFit) {
 TEST_F(ProbeLines, FailsIfNobodyListensOrSends) {
   const auto free = sim::listen_tcp(0).value();
   const auto port = sim::port_of(free);
-  const auto silent = probe(fmt::format("--wait-s 0.5 --host 127.0.0.1 --port {}", port));
+  const auto silent = probe(fmt::format("--host 127.0.0.1 --port {}", port));
   EXPECT_EQ(silent.exit, 4);
-  EXPECT_THAT(silent.err, HasSubstr(fmt::format("127.0.0.1:{}: no line in 0.5 s", port)));
+  EXPECT_THAT(silent.err, HasSubstr(fmt::format("127.0.0.1:{}: no line in", port)));
   EXPECT_EQ(probe("--host 127.0.0.1 --port 1").exit, 4);
 }
 

@@ -115,7 +115,7 @@ void print_model(const ModelDocument& document) {
     fmt::print(
         "travel      V depends on the direction of travel ({}): abbe model eval --direction\n",
         calib::backlash_name(document.model.travel()->kind));
-  fmt::print("\n{}", to_tables_csv(document.model, document.backlash));
+  fmt::print("\n{}", to_tables_csv(document.model, document.backlash, Digits::Six));
 }
 
 /// Shows a model file. It need not be in a store; without a store it is not known whether the model

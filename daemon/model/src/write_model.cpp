@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
+
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/calib/model/backlash.hpp"
@@ -421,17 +423,19 @@ std::string to_coefficients_csv(const calib::PolynomialModel& model) {
 }
 
 std::string to_tables_csv(const calib::VolumetricModel& model,
-                          std::span<const calib::Backlash> backlash) {
+                          std::span<const calib::Backlash> backlash, Digits digits) {
+  const auto number = [digits](double value, int shift) {
+    return digits == Digits::All ? to_decimal(value, shift)
+                                 : fmt::format("{:.6g}", value * std::pow(10.0, shift));
+  };
   std::string text = "name,position_mm,value,u,unit\n";
   for (const auto& p : model.parameters())
-    text +=
-        fmt::format("{},{},{},{},{}\n", p.name, p.position_m ? to_decimal(*p.position_m, kMm) : "",
-                    to_decimal(p.value, kMicroUnit), to_decimal(p.u, kMicroUnit), unit_of(p));
+    text += fmt::format("{},{},{},{},{}\n", p.name, p.position_m ? number(*p.position_m, kMm) : "",
+                        number(p.value, kMicroUnit), number(p.u, kMicroUnit), unit_of(p));
   for (const auto& b : backlash)
     text += fmt::format("{}.backlash,{},{},{},{}\n", calib::name(b.motion),
-                        b.position_m ? to_decimal(*b.position_m, kMm) : "",
-                        to_decimal(b.value, kMicroUnit), to_decimal(b.u, kMicroUnit),
-                        unit_of(b.motion));
+                        b.position_m ? number(*b.position_m, kMm) : "", number(b.value, kMicroUnit),
+                        number(b.u, kMicroUnit), unit_of(b.motion));
   return text;
 }
 

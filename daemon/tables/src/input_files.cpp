@@ -215,6 +215,21 @@ Result<void> check_distances(const TrackerFile& points, const std::filesystem::p
                           file.string(), nearest_m * kMmPerM, where, kNearest_m * kMmPerM, advice));
 }
 
+/// A second fault of a file with one mean for each standstill, so that a person learns of both at
+/// once; else empty.
+std::string means_text(const TrackerFile& points) {
+  constexpr double kFarApart_s = 1.0;
+  if (points.points.size() < 2) return {};
+  const double period_s = (points.points.back().time_s - points.points.front().time_s) /
+                          static_cast<double>(points.points.size() - 1);
+  return period_s < kFarApart_s
+             ? ""
+             : fmt::format(
+                   ". Its rows are {:.3g} s apart: if each is the mean of a standstill, export "
+                   "every measurement instead, because means do not show their scatter",
+                   period_s);
+}
+
 }  // namespace
 
 Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vector3>& centre_m,
@@ -236,8 +251,8 @@ Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vecto
             "{}: the columns x_mm, y_mm, z_mm do not state their frame, and noise and offset of "
             "the ranges act along the beams. Points in the frame of the tracker: name the columns "
             "tracker_x_mm, tracker_y_mm, tracker_z_mm. Points exported in machine or station "
-            "coordinates: state with {} where the tracker stands in them",
-            file.string(), option));
+            "coordinates: state with {} where the tracker stands in them{}",
+            file.string(), option, means_text(points)));
 
   for (auto& point : points.points) point.p_tracker_m -= *centre_m;
   points.frame = TrackerFile::Frame::Parallel;

@@ -478,6 +478,13 @@ TEST(ModelDocument, GivesBacklashToSpreadsheets) {
   EXPECT_THAT(csv, HasSubstr("\nEXX.backlash,,2.859,0.086,um\nEBX.backlash,-300,-3.6,0.24,urad\n"));
 }
 
+TEST(ModelDocument, GivesTablesOfSixDigitsToPeople) {
+  const auto csv = to_tables_csv(synthetic_model(10), {}, Digits::Six);
+  EXPECT_THAT(csv, ::testing::StartsWith("name,position_mm,value,u,unit\nEXX,-300,"));
+  EXPECT_THAT(csv, Not(::testing::ContainsRegex("[0-9]{7}")));
+  EXPECT_THAT(csv, Not(::testing::ContainsRegex("[1-9][.][0-9]{6}")));
+}
+
 TEST(ModelDocument, GivesTablesToSpreadsheets) {
   const auto csv = to_tables_csv(synthetic_model(10));
   EXPECT_THAT(csv, ::testing::StartsWith("name,position_mm,value,u,unit\nEXX,-300,"));

@@ -154,10 +154,14 @@ struct ModelDocument {
 /// for a polynomial model.
 [[nodiscard]] std::string to_coefficients_csv(const calib::PolynomialModel& model);
 
+/// All: the numbers read back to the same bits. Six: six significant digits, for people.
+enum class Digits { All, Six };
+
 /// CSV with the columns `name,position_mm,value,u,unit`: tables and squareness, then backlash
 /// (`EXX.backlash`).
 [[nodiscard]] std::string to_tables_csv(const calib::VolumetricModel& model,
-                                        std::span<const calib::Backlash> backlash = {});
+                                        std::span<const calib::Backlash> backlash = {},
+                                        Digits digits = Digits::All);
 
 /// Note in the verdict if a candidate is not compared with the active model.
 inline constexpr std::string_view kOfAnotherMachine =

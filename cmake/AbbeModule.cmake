@@ -19,15 +19,15 @@ if(ABBE_SANITIZE MATCHES "thread")
   list(APPEND abbe_observing_options -fsanitize=thread -fno-omit-frame-pointer -O1 -g1 -UNDEBUG)
   add_link_options(-fsanitize=thread)
 elseif(ABBE_SANITIZE)
-  add_compile_options(-fsanitize=${ABBE_SANITIZE} -fno-omit-frame-pointer)
+  set(abbe_sanitizing_options -fsanitize=${ABBE_SANITIZE} -fno-omit-frame-pointer -O2 -g1 -UNDEBUG)
   add_link_options(-fsanitize=${ABBE_SANITIZE})
   if(ABBE_SANITIZE MATCHES "undefined")
     # The check object-size takes a fifth of the optimizer's time, and ASan finds the same accesses
     # outside an object.
-    add_compile_options(-fno-sanitize-recover=undefined -fno-sanitize=object-size)
+    list(APPEND abbe_sanitizing_options -fno-sanitize-recover=undefined -fno-sanitize=object-size)
   endif()
 endif()
-add_compile_options(${abbe_observing_options})
+add_compile_options(${abbe_observing_options} ${abbe_sanitizing_options})
 # The fuzzer measures coverage in modules, not in programs and tests.
 if(ABBE_FUZZ)
   set(abbe_coverage_options -fsanitize=fuzzer-no-link)
@@ -62,7 +62,9 @@ endfunction()
 # CLI11, fmt, toml++ and JSON take most of the time of a release build; -O1 is sufficient for such
 # code.
 function(abbe_compile_brief target)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  if(NOT abbe_sanitizing_options)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endif()
 endfunction()
 
 # For targets that use Eigen.
@@ -75,24 +77,28 @@ endfunction()
 #   has the result. With ThreadSanitizer an identification would take minutes. Such a target must not
 #   use std::shared_ptr: the linker may keep its copy of the reference counter for the whole program,
 #   and ThreadSanitizer, which does not see this copy, reports races where there are none.
-# - Products and decompositions take five times as long with AddressSanitizer. A target of
-#   `calib` is compiled without it unless ABBE_SANITIZE_CALIB is set, as `scripts/nightly calib`
-#   does. The assertions of Eigen and of the C++ library, which test every index, and UBSan stay on.
-option(ABBE_SANITIZE_CALIB "Compile calib and its tests with AddressSanitizer, too" OFF)
+# - Products and decompositions take five times as long with AddressSanitizer. A target of `calib`
+#   is compiled as in the release build, so that ccache has it, unless ABBE_SANITIZE_CALIB is set:
+#   `scripts/nightly calib` runs its tests with both sanitizers and all assertions.
+option(ABBE_SANITIZE_CALIB "Compile calib and its tests with the sanitizers, too" OFF)
+function(abbe_remove_options target)
+  get_target_property(options ${target} COMPILE_OPTIONS)
+  list(REMOVE_ITEM options ${ARGN})
+  set_property(TARGET ${target} PROPERTY COMPILE_OPTIONS ${options})
+endfunction()
+
 function(abbe_compile_mathematics target)
   if(ABBE_SANITIZE MATCHES "undefined")
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,pointer-overflow)
   endif()
-  get_target_property(options ${target} COMPILE_OPTIONS)
-  list(REMOVE_ITEM options ${abbe_observing_options})
-  set_property(TARGET ${target} PROPERTY COMPILE_OPTIONS ${options})
+  abbe_remove_options(${target} ${abbe_observing_options})
 endfunction()
 
 function(abbe_compile_calib target)
-  abbe_compile_mathematics(${target})
-  if(ABBE_SANITIZE MATCHES "address" AND NOT ABBE_SANITIZE_CALIB)
-    target_compile_options(${target} PRIVATE -fno-sanitize=address)
-    target_compile_definitions(${target} PRIVATE _GLIBCXX_ASSERTIONS)
+  if(ABBE_SANITIZE_CALIB)
+    abbe_compile_mathematics(${target})
+  else()
+    abbe_remove_options(${target} ${abbe_observing_options} ${abbe_sanitizing_options})
   endif()
 endfunction()
 

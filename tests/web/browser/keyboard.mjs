@@ -17,7 +17,7 @@ async function focused({ page }) {
     const above = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
     const name = e.getAttribute("aria-label") ?? e.getAttribute("name") ?? e.innerText.trim();
     const isStop = e !== document.body;
-    return { name, marked: !isStop || e.matches(":focus-visible"),
+    return { name, marked: !isStop || e.matches(":focus-visible") || getComputedStyle(e).outlineStyle === "solid",
       seen: !isStop || (right > left && bottom > top && above !== null && (e === above || e.contains(above))) };
   });
 }

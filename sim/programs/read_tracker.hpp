@@ -1,5 +1,6 @@
 #pragma once
-/// [sim.tracker], with the drift of the tracker and the reference nests that it visits.
+/// Reads the simulated tracker: [sim.tracker] with its drift, and the reference nests that it
+/// visits.
 
 #include "setup_draft.hpp"
 #include "toml_file.hpp"

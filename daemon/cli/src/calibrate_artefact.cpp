@@ -222,7 +222,8 @@ void add_calibrate_artefact(CLI::App& parent, int& exit) {
       ->capture_default_str();
   command->add_option(
       "--touches", arguments->touches,
-      "file for the touches (default: in the folder of the output); .partial.csv if the run fails");
+      "file for the touches (default: the name of --out with .touches.csv). If the run fails, the\n"
+      "touches made so far are in a separate file with .partial.csv");
   command
       ->add_option("--at-mm", arguments->at_mm,
                    "x,y,z: position of the artefact's origin in the machine, mm")

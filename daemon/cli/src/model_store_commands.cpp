@@ -113,7 +113,8 @@ void print_model(const ModelDocument& document) {
   fmt::print("devices     {}\n", devices_in_words(made_on_simulated_devices(document)));
   if (document.model.travel() != nullptr)
     fmt::print(
-        "travel      V depends on the direction of travel ({}): abbe model eval --direction\n",
+        "travel      V depends on the direction of travel (backlash {}); for one direction: abbe "
+        "model eval --direction\n",
         calib::backlash_name(document.model.travel()->kind));
   fmt::print("\n{}", to_tables_csv(document.model, document.backlash, Digits::Six));
 }

@@ -28,8 +28,8 @@ void read_drift(ClassifiedSection& root, Config& out) {
     section.fault("continuous", "needs test = true: a table that drifted must not be averaged");
   if (drift.continuous && out.otf.backlash != OtfBacklash::None)
     section.fault("continuous",
-                  "needs backlash = \"none\" in [otf]: half the backlash is in the uncertainty of "
-                  "every run, and an update would take it for noise that averages out");
+                  "needs backlash = \"none\" in [otf]. With another setting the uncertainty of "
+                  "every run contains half the backlash, which an update would average as noise");
   if (drift.continuous && out.otf.smoothness_m)
     section.fault("continuous",
                   "needs [otf] without smoothness_um: every run would contain the prior, and an "

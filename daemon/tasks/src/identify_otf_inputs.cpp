@@ -57,9 +57,9 @@ Result<void> apply_smoothness(const std::string& text, Config& config) {
     valid = valid && (value_m == 0.0 || otf::is_bend_size(value_m));
   if (!valid)
     return fail(ErrorCode::Usage,
-                fmt::format("--smoothness-um \"{}\": must be none, or the standard deviation of "
-                            "the bend over nodes 50 mm apart in um, 0.01 to 1000: one number, or "
-                            "X,Y,Z with 0 for no prior",
+                fmt::format("--smoothness-um \"{}\": must be none, or the standard deviation in um "
+                            "of the second difference over three nodes 50 mm apart, 0.01 to 1000. "
+                            "One number for all axes, or X,Y,Z; 0: no prior for that axis",
                             text));
   smoothness_m = {bend_m[0], bend_m[1], bend_m[2]};
   return {};

@@ -360,8 +360,8 @@ std::string shots_text(const verify::Observations& o) {
   const auto [fewest, most] =
       std::ranges::minmax(o.shots, {}, [](const auto& of_place) { return of_place.size(); });
   return fmt::format(
-      "{} shots at {} places, {} to {} each, which scatter by {:.2f} um about the means of their "
-      "places",
+      "{} shots at {} places, {} to {} each; their standard deviation about the means of their "
+      "places is {:.2f} um (3-D)",
       shots, places, fewest.size(), most.size(), kUmPerM * *o.repeatability_m);
 }
 

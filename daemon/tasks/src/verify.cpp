@@ -78,8 +78,8 @@ Result<void> check_tools(const std::vector<ModelAtPoints>& models) {
   });
   if (other == models.end()) return {};
   return fail(ErrorCode::Usage,
-              fmt::format("{} and {} have different tool offsets, the points were measured with "
-                          "one: give it with --tool-mm",
+              fmt::format("{} and {} have different tool offsets. State with --tool-mm the tool "
+                          "offset with which the points were measured",
                           first.model.name, other->model.name));
 }
 

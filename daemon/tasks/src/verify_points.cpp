@@ -98,7 +98,7 @@ std::string place_of(const VerificationFile& file, std::size_t point) {
                                    : fmt::format("point {}", point + 1);
 }
 
-/// `error` of the fit of all points: if some alone do not fit, they are the cause.
+/// Returns an error that lists the points that do not fit the others; `error` if there are none.
 Error with_points_off(Error error, const VerificationFile& file) {
   std::vector<calib::Vector3> measured_m, readings_m;
   for (const auto& point : file.points) {
@@ -108,8 +108,8 @@ Error with_points_off(Error error, const VerificationFile& file) {
   const auto off = calib::fit::points_off(measured_m, readings_m);
   if (off.points.empty()) return error;
   return {error.code,
-          fmt::format("verification: {} of {} points alone do not fit the others",
-                      off.points.size(), file.points.size()),
+          fmt::format("verification: {} of {} points do not fit the others", off.points.size(),
+                      file.points.size()),
           lines_of_points_off(file, off, "correct or delete it")};
 }
 

@@ -17,8 +17,8 @@ namespace {
 constexpr int kInterface = 0;
 constexpr std::size_t kLargestAnswer = usb::kMaxDescriptor;
 /// Cancelled transfers normally end immediately, but not if the host controller hangs. close()
-/// waits for them for at most this many cycles of kCloseCycle; each later open() waits one cycle
-/// more.
+/// waits for them for at most this many cycles of kCloseCycle. If transfers are pending after that,
+/// each later open() waits for one further cycle.
 constexpr int kMostCloseCycles = 20;
 constexpr timeval kCloseCycle{0, 50'000};
 

@@ -287,7 +287,7 @@ TEST_F(VerifyCli, StatesShotsAndPlaces) {
   const auto ran = abbe("verify tables.json --points shots.csv -o out");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out,
-              HasSubstr("points      348 shots at 343 places, 1 to 6 each, which scatter"));
+              HasSubstr("points      348 shots at 343 places, 1 to 6 each; their standard"));
   EXPECT_THAT(text_of(folder_ / "out/report.html"),
               AllOf(HasSubstr("348 shots at 343 places"), HasSubstr("(6 shots)")));
   const auto object =

@@ -280,8 +280,8 @@ Result<void> check_alignment(const StepGauge& gauge, const GaugeLine& line, cons
   if (along.x() < 0.0) {
     return failure(
         ErrorCode::BadInput,
-        "step gauge: its faces ascend from the last hole to the first: begin at the face "
-        "near hole 1");
+        "step gauge: face 1 is at the end near the last hole of the bar; begin at the face near "
+        "hole 1");
   }
   const double most_rad = most_angle_rad(gauge, bar);
   if (along.tail<2>().norm() <= most_rad) {

@@ -253,7 +253,8 @@ bool is_inside(const Observations& o, const PassObservation& pass, std::size_t h
   return volume.contains(centre + (reading - centre) / kWidened);
 }
 
-/// The passes whose tool the model is valid for, with half of their points in its volume or more.
+/// Keeps the passes with a tool for which `model` is valid, and with at least half of their points
+/// in its validity volume.
 Observations passes_of_model(const Observations& all, const VolumetricModel& model) {
   Observations o = all;
   for (std::size_t i = o.passes.size(); i-- > 0;) {

@@ -51,7 +51,7 @@ void judge_set_aside(Verdict& verdict, const Identification& found) {
   }
   if (!found.unresolved_features.empty()) {
     verdict.refuse("outliers", message(found.unresolved_features.front(),
-                                       ": the touches do not fit together: touch it again (",
+                                       ": the touches do not fit together: touch it again (one of ",
                                        found.unresolved_features.size(), " such features)"));
   }
   if (static_cast<double>(found.set_aside.size()) > kMostSetAside * static_cast<double>(touches)) {
@@ -106,7 +106,8 @@ Result<Verdict> judge(const Identification& found, const VolumetricModel* active
   verdict.notes.insert(verdict.notes.end(), found.notes.begin(), found.notes.end());
   if (options.solve.estimator == Estimator::Sequential) {
     verdict.notes.emplace_back(
-        "the published sequence is not fitted again without the points that are left out");
+        "held-out test of the estimator \"sequential\": the tables are not estimated again without "
+        "the held-out points, so that the test is not independent of them");
   }
   verdict.accepted = verdict.reasons.empty();
   return verdict;

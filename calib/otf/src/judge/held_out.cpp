@@ -90,8 +90,8 @@ Result<FittedFold> fit_fold(const RunByFold& first, const estimation::Informatio
   return fitted;
 }
 
-/// Fits U without the legs of a fold. A leg that has the only observations of a node of a table in
-/// its run remains in the fit. If U is not determined even with these legs, the result has no
+/// Estimates the unknowns without the legs of one fold. A leg of the fold stays in the fit if it
+/// alone observes a node of a table in its run. If the rank is too small even so, the result has no
 /// held-out rows.
 Result<HeldOutFold> hold_out(const std::vector<RunByFold>& runs, std::size_t fold,
                              std::size_t folds, const Options& options) {

@@ -116,7 +116,8 @@ std::string correction_text(const Vector3& found, const Vector3& given, double a
       continue;
     }
     const auto about = half_turn_about(R);
-    return about ? message("; they agree after a rotation by 180 degrees about ", letter(*about),
+    return about ? message("; they agree after a rotation of the path by 180 degrees about ",
+                           letter(*about),
                            ": the signs of the other two axes are reversed in the path file")
                  : message("; they agree with the columns (x, y, z) of the path file read as ",
                            columns(R));

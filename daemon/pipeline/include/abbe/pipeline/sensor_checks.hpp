@@ -75,8 +75,9 @@ class SensorChecks {
   [[nodiscard]] double applied(const CheckedEnvironment& checked, std::size_t channel,
                                protocol::HostTime t) const;
 
-  /// Whether a person may state now that `sensor` is right. Usage: there is no such sensor;
-  /// Refused, with the reason: it is in use, or something else must be repaired.
+  /// Checks whether a person may accept `sensor` now. Error Usage: there is no such sensor. Error
+  /// Refused: its readings are used already, or a fault must be repaired first; the text says
+  /// which.
   [[nodiscard]] Result<void> check_acceptance(std::string_view sensor) const;
   /// Discards the history of the sensor: it is used when its next readings agree with each other,
   /// wherever the other sensors are. Also ends the doubt about it and a twin that is silent.

@@ -55,8 +55,8 @@ struct Verification {
 /// without it; 340 of 343 places improved".
 [[nodiscard]] std::string verdict_text(const calib::verify::Comparison&);
 
-/// How many shots there are, and their repeatability: "348 shots at 343 places, 1 to 6 each, which
-/// scatter by 1.20 um about the means of their places".
+/// How many shots there are, and their repeatability: "348 shots at 343 places, 1 to 6 each; their
+/// standard deviation about the means of their places is 1.20 um (3-D)".
 [[nodiscard]] std::string shots_text(const calib::verify::Observations&);
 
 /// Why the report does not give R_resmag (residual / error without compensation); nullopt if it

@@ -64,7 +64,9 @@ struct Observations {
   Vector3 target_offset_m = Vector3::Zero();
   SparseRows A{};  ///< unknowns() columns
   std::vector<Observation> rows{};
-  std::vector<Vector3> sub_points_m{};  ///< nominal axis positions; rows are averaged over them
+  /// Points within the segments, as nominal axis positions: a row of A is the mean of the model
+  /// over the sub-points of its segment.
+  std::vector<Vector3> sub_points_m{};
   Alignment alignment{};
   std::vector<Vector3> vertices_m{};     ///< vertices of the path, axis positions
   std::vector<AxisTravel> travel{};      ///< by Observation::leg; a leg that is missing: unknown

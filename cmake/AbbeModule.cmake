@@ -79,7 +79,9 @@ endfunction()
 #   and ThreadSanitizer, which does not see this copy, reports races where there are none.
 # - Products and decompositions take five times as long with AddressSanitizer. A target of `calib`
 #   is compiled as in the release build, so that ccache has it, unless ABBE_SANITIZE_CALIB is set:
-#   `scripts/nightly calib` runs its tests with both sanitizers and all assertions.
+#   `scripts/nightly calib` runs its tests with both sanitizers and the assertions of Eigen and of
+#   the C++ library. calib comes first in a program, so that the copies of inline functions which it
+#   contains are those of the whole program: they are not checked in the other modules, either.
 option(ABBE_SANITIZE_CALIB "Compile calib and its tests with the sanitizers, too" OFF)
 function(abbe_remove_options target)
   get_target_property(options ${target} COMPILE_OPTIONS)
@@ -97,6 +99,7 @@ endfunction()
 function(abbe_compile_calib target)
   if(ABBE_SANITIZE_CALIB)
     abbe_compile_mathematics(${target})
+    target_compile_definitions(${target} PRIVATE _GLIBCXX_ASSERTIONS)
   else()
     abbe_remove_options(${target} ${abbe_observing_options} ${abbe_sanitizing_options})
   endif()

@@ -270,7 +270,7 @@ TEST(MfbJudge, StatesThatTheSequenceIsNotFittedAgain) {
   ASSERT_TRUE(found) << found.error().text;
   const auto verdict = judge(*found, nullptr, {.solve = options.solve});
   ASSERT_TRUE(verdict) << verdict.error().text;
-  EXPECT_THAT(verdict->notes, Contains(HasSubstr("is not fitted again")));
+  EXPECT_THAT(verdict->notes, Contains(HasSubstr("estimated again")));
   EXPECT_GT(verdict->held_out.no_compensation, 2 * verdict->held_out.candidate);
 }
 

@@ -69,7 +69,8 @@ TEST(OtfPlan, GivesThePathFoundSoFarWhenThatIsEnough) {
   options.enough = [] { return true; };
   const auto at_once = plan(few_nodes(), {.length_m = kLength_m}, options);
   ASSERT_TRUE(at_once) << at_once.error().text;
-  EXPECT_EQ(at_once->path.vertices_m, walked()->path.vertices_m);
+  EXPECT_TRUE(at_once->ended_early);
+  EXPECT_NEAR(at_once->rms_u_m, walked()->rms_u_m, 0.02 * walked()->rms_u_m);
 }
 
 TEST(OtfPlan, EstimateIsThePredictedUncertainty) {

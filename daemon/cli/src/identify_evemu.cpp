@@ -229,6 +229,7 @@ void add_options(CLI::App& command, IdentifyEvemuCommand& arguments) {
                                       "standard uncertainty of the reference's V")
                           ->check(CLI::PositiveNumber);
   reference->needs(u_reference);
+  u_reference->needs(reference);
   command.add_flag(
       "--accept-shape-only", arguments.accept_shape_only,
       "do not refuse the model because its rotation about Ball1 is unknown; as [gate] accept =\n"

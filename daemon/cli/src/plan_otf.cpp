@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
@@ -51,6 +52,7 @@ nlohmann::json plan_json(const PathPlan& plan, const PlanOtfCommand& arguments) 
           {"points_per_s", plan.run.points_per_s},
           {"tracker_mm", in_mm(plan.run.tracker_m)},
           {"corners_not_reached", plan.corners_not_reached},
+          {"ended_early", plan.ended_early},
           {"prediction", prediction_json(plan.prediction)},
           {"base_path", plan.base ? prediction_json(*plan.base) : nlohmann::json{}},
           {"trackers_compared", trackers}};
@@ -132,9 +134,13 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
 
 int run(const PlanOtfCommand& arguments) {
   ProgressBar bar(!arguments.json);
-  mark_interruptions({SIGINT});
+  if (arguments.path.empty()) mark_interruptions({SIGINT});
   const auto plan = plan_otf(arguments, bar.progress());
   bar.clear();
+  if (!plan && interrupted()) {
+    fmt::print(stderr, "abbe: interrupted before the first path was found\n");
+    return number(ExitCode::Interrupted);
+  }
   if (!plan) return report(plan.error());
   std::vector<std::string> written;
   if (!arguments.out.empty()) {
@@ -203,7 +209,7 @@ void add_plan_otf(CLI::App& parent, int& exit) {
       "for its length, beside the usual path of edges and diagonals. Writes path.csv, map.csv,\n"
       "plan.json and programs for the control to OUT. White noise is predicted, and an offset of\n"
       "the ranges ([tracker] u_range_offset_um); turbulence adds to it. The first path is there\n"
-      "after seconds and becomes better by a few per cent; Ctrl-C takes the one found so far.");
+      "after seconds and becomes better by a few per cent; Ctrl-C: use the one found so far.");
   add_machine_options(*command, *arguments);
   command
       ->add_option(

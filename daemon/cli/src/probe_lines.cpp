@@ -113,6 +113,23 @@ void print_understood(const UnderstoodLines& understood) {
              kMmPerMetre * understood.greatest_distance_m);
 }
 
+/// A table that the lines contradict is not written.
+Result<void> require_agreement(const ProbedLines& probed, const std::string& out) {
+  constexpr double kMostUnreadable = 0.05;
+  std::vector<std::string> faults = probed.notes;
+  const auto& understood = *probed.understood;
+  const auto lines = static_cast<double>(understood.points + understood.unreadable);
+  if (static_cast<double>(understood.unreadable) > kMostUnreadable * lines)
+    faults.push_back(fmt::format("{} of {:.0f} lines cannot be read: {}", understood.unreadable,
+                                 lines, understood.first_fault));
+  if (understood.invalid == understood.points)
+    faults.emplace_back("every point is invalid by its status: --valid-status");
+  if (faults.empty()) return {};
+  return tl::make_unexpected(Error{ErrorCode::DataInsufficient,
+                                   fmt::format("{} is not written: the lines contradict it", out),
+                                   std::move(faults)});
+}
+
 /// With a table that is incomplete, and a file to write it to, or columns that do not fit.
 Result<void> require_table(const ProbedLines& probed, const ProbeLinesArguments& arguments) {
   const auto& understood = probed.understood;
@@ -120,13 +137,16 @@ Result<void> require_table(const ProbedLines& probed, const ProbeLinesArguments&
     return fail(ErrorCode::DataInsufficient,
                 fmt::format("{}: no line can be read with these columns: {}", probed.where,
                             understood->first_fault));
-  if (probed.missing.empty() || arguments.out.empty()) return {};
-  return tl::make_unexpected(Error{
-      ErrorCode::Usage, fmt::format("write {}: not all is stated", arguments.out), probed.missing});
+  if (arguments.out.empty()) return {};
+  if (!probed.missing.empty())
+    return tl::make_unexpected(Error{ErrorCode::Usage,
+                                     fmt::format("write {}: options are missing", arguments.out),
+                                     probed.missing});
+  return require_agreement(probed, arguments.out);
 }
 
 void print_missing(const ProbedLines& probed) {
-  fmt::print("for a table of the configuration, state:\n");
+  fmt::print("missing options for a table of the configuration:\n");
   for (const auto& missing : probed.missing) fmt::print("  {}\n", missing);
 }
 

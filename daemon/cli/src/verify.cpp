@@ -241,7 +241,12 @@ int run(const VerifyCommand& arguments) {
   const bool worse = std::ranges::any_of(found->models, [](const ModelAtPoints& one) {
     return verify::effect_at_points(one.comparison) == verify::Effect::Worse;
   });
-  return number(worse ? ExitCode::Worse : ExitCode::Done);
+  if (worse) return number(ExitCode::Worse);
+  const bool failed = found->models.size() == 1 &&
+                      std::ranges::any_of(judged_residuals(*found), [](const JudgedResidual& one) {
+                        return one.conformity == Conformity::Fail;
+                      });
+  return number(failed ? ExitCode::Refused : ExitCode::Done);
 }
 
 void add_options(CLI::App& command, VerifyCommand& arguments) {
@@ -315,8 +320,10 @@ void add_verify(CLI::App& parent, int& exit) {
       "if the points are dense enough to interpolate, R_resmag = |residual| / |measured error| on\n"
       "a grid inside the model's volume. Several shots of one place count as one place, with "
       "their\n"
-      "mean. Exit code 8 if the errors are larger with the model (with one of several models). If\n"
-      "the recording is damaged before its end, the result is printed and the exit code is 1.");
+      "mean. Exit code 8 if the errors are larger with the model (with one of several models), 5 "
+      "if\n"
+      "a residual is beyond a limit of --details. If the recording is damaged before its end, the\n"
+      "result is printed and the exit code is 1.");
   add_options(*command, *arguments);
 
   command->callback([arguments, &exit] {

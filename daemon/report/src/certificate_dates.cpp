@@ -161,7 +161,13 @@ std::vector<std::string> wrong_verification_dates(const CertificateDetails& deta
   if (details.now && day > day_of(*details.now + kMostAheadOfUtc))
     wrong.push_back(fmt::format("verification.date: {} is in the future, today is {} (UTC)", day,
                                 day_of(*details.now)));
-  compare_equipment(details.equipment, EquipmentUse::Verification, "the verification", day, wrong);
+  if (!details.issue_date.empty() && details.issue_date < day)
+    wrong.push_back(fmt::format("certificate.issue_date: {} is before the verification, {}",
+                                details.issue_date, day));
+  compare_with_today(details, wrong);
+  const std::string ended = day.empty() && details.now ? day_of(*details.now) : day;
+  compare_equipment(details.equipment, EquipmentUse::Verification, "the verification", ended,
+                    wrong);
   return wrong;
 }
 

@@ -106,10 +106,11 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
       cells[column] = table.at(row, column);
     const auto [first, is_new] = lines.emplace(cells, table.line(row));
     if (!is_new && table.sound(row))
-      faults.add_kind("repeated", table.line(row), 1, "",
-                      fmt::format("repeats line {} in every digit: the same touch twice; delete "
-                                  "one of the rows",
-                                  first->second));
+      faults.add_kind(
+          "repeated", table.line(row), 1, "",
+          fmt::format("repeats line {} in every digit: a copy of the row, or two touches of "
+                      "one point on a coarse display; delete one of the rows",
+                      first->second));
     out.lines.push_back(table.line(row));
     out.touches.push_back({.position = number_at(table, row, 0, "position", faults),
                            .feature = table.at(row, 1) < 0.5 ? calib::evemu::Feature::Ball

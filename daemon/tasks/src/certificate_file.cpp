@@ -102,6 +102,9 @@ void read_verification(Section section, VerificationDetails& out) {
   for (const std::string_view limit : {"limit_rms_um", "limit_max_um"})
     if (section.has(limit) && !section.has("u_um"))
       section.fault(limit, "needs u_um, the standard uncertainty of a measured coordinate");
+  for (const std::string_view limit : {"limit_rms_um", "limit_max_um"})
+    if (section.has(limit) && !section.has("date"))
+      section.fault(limit, "needs date, the day of the measurement");
   section.close();
 }
 

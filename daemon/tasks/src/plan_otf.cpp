@@ -81,11 +81,12 @@ otf::PathBudget budget_of(const PlanOtfArguments& arguments, const otf::Machine&
 /// Compares the tracker positions by quick walks, and sets the best one in `run`.
 Result<std::vector<std::pair<calib::Vector3, double>>> compare_trackers(
     otf::PlannedRun& run, const std::vector<calib::Vector3>& trackers,
-    const otf::PathBudget& budget) {
+    const otf::PathBudget& budget, const PlanOtfArguments& arguments) {
   std::vector<std::pair<calib::Vector3, double>> compared;
   for (const auto& tracker_m : trackers) {
     run.tracker_m = tracker_m;
-    const auto quick = otf::plan(run, budget, {.lattice = 3, .exchanges = 0});
+    const auto quick =
+        otf::plan(run, budget, {.lattice = 3, .exchanges = 0, .stopped = arguments.enough});
     if (!quick) return tl::make_unexpected(error_of(quick.error()));
     compared.emplace_back(tracker_m, quick->rms_u_m);
   }
@@ -124,7 +125,7 @@ Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& pro
     plan.path = *std::move(path);
   } else {
     if (trackers->size() > 1) {
-      auto compared = compare_trackers(plan.run, *trackers, budget);
+      auto compared = compare_trackers(plan.run, *trackers, budget, arguments);
       ABBE_TRY(compared);
       plan.trackers = *std::move(compared);
     }
@@ -133,12 +134,11 @@ Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& pro
         plan.run, budget,
         {.lattice = arguments.lattice,
          .exchanges = arguments.exchanges,
-         .stopped = [&progress] { return progress.stopped(); },
+         .stopped = arguments.enough,  // before there is a path
          .enough = arguments.enough,
-         .progress =
-             [&progress](double share, double rms_u_m) {
-               progress.show(fmt::format("{:.4f} um; Ctrl-C takes it", rms_u_m * kUmPerM), share);
-             }});
+         .progress = [&progress](double share, double rms_u_m) {
+           progress.show(fmt::format("{:.4f} um (Ctrl-C: use it)", rms_u_m * kUmPerM), share);
+         }});
     if (!best) return tl::make_unexpected(error_of(best.error()));
     plan.path = best->path;
     plan.corners_not_reached = best->corners_not_reached;

@@ -97,8 +97,8 @@ class Reception {
     const double wait_s = seconds_of(command_.longest_wait);
     if (bytes_ > 0)
       return fmt::format(
-          "{} bytes but no end of a line in {:.3g} s: is this the right port, and "
-          "for a serial line the right baud rate?",
+          "{} bytes but no line with a point in {:.3g} s: is this the right port, and for a serial "
+          "line the right baud rate? Comments and lines above 512 bytes are no points",
           bytes_, wait_s);
     if (connected_ || !link_.connection_oriented())
       return fmt::format(

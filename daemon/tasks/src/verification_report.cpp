@@ -95,6 +95,10 @@ void add_identity(HtmlReport& page, const Verification& v) {
       "certificate.toml.");
 }
 
+bool in_doubt(const Verification& v) {
+  return !v.likely_mistakes.empty() || !v.cut_short.empty();
+}
+
 void add_tolerance(HtmlReport& page, const Verification& v) {
   page.heading("Tolerance");
   const auto judged = judged_residuals(v);
@@ -108,6 +112,8 @@ void add_tolerance(HtmlReport& page, const Verification& v) {
                     fmt::format("{:.2f} \u00b1 {:.2g} um", one.value_um, one.U_um),
                     fmt::format("{:g} um", one.limit_um), std::string{name(one.conformity)}});
   page.table({"", "value \u00b1 U (95 %)", "limit", "verdict"}, rows);
+  if (in_doubt(v))
+    page.paragraph("No pass: a mistake in the file is likely, or points are missing (verdict).");
   page.paragraph(fmt::format(
       "Guard band of ISO 14253-1: pass if value + U is within the limit, fail if value - U is "
       "beyond it. U from u = {:g} um of each measured coordinate.",
@@ -117,6 +123,16 @@ void add_tolerance(HtmlReport& page, const Verification& v) {
 void add_verdict(HtmlReport& page, const Verification& v) {
   page.heading("Verdict");
   page.paragraph(verdict_text(v.comparison()) + ".");
+  if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
+  for (const std::string& mistake : v.likely_mistakes)
+    page.paragraph("A mistake in the file is likely: the points fit far better with " + mistake +
+                   ".");
+  for (const std::string& point : v.points_off) page.paragraph("One point: " + point + ".");
+  if (v.repeated > 0)
+    page.paragraph(fmt::format(
+        "{} rows repeat another row in every digit and count once: where they are shots of their "
+        "own, the repeatability is smaller than stated.",
+        v.repeated));
   for (const std::string& caution : v.models.front().model.cautions)
     page.paragraph("Of the model: " + caution + ".");
 }
@@ -124,7 +140,6 @@ void add_verdict(HtmlReport& page, const Verification& v) {
 void add_left(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison();
   page.heading("Residuals at the measured places");
-  if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
   page.paragraph(fmt::format(
       "{}. {} of these places are in the volume where the model is valid. The shots of one place "
       "count as one place, with their mean, because errors that they have in common do not average "
@@ -332,11 +347,13 @@ std::vector<JudgedResidual> judged_residuals(const Verification& v) {
   const auto& after = v.comparison().after;
   const auto U = verify::expanded_uncertainty(*of.u_um / kUmPerM, v.inside);
   std::vector<JudgedResidual> judged;
-  const auto judge = [&judged](const char* name, double value_m, double U_m,
-                               const std::optional<double>& limit_um) {
+  const auto judge = [&judged, &v](const char* name, double value_m, double U_m,
+                                   const std::optional<double>& limit_um) {
     if (!limit_um) return;
     const double value_um = kUmPerM * value_m, U_um = kUmPerM * U_m;
-    judged.push_back({name, value_um, U_um, *limit_um, conformity_of(value_um, U_um, *limit_um)});
+    auto conformity = conformity_of(value_um, U_um, *limit_um);
+    if (conformity == Conformity::Pass && in_doubt(v)) conformity = Conformity::Neither;
+    judged.push_back({name, value_um, U_um, *limit_um, conformity});
   };
   judge("rms", after.rms_m, U.rms_m, of.limit_rms_um);
   judge("largest", after.max_m, U.max_m, of.limit_max_um);

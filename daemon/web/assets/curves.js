@@ -16,7 +16,7 @@ async function groupOf(place, group, unit, changed) {
   const column = (title) => h("th", { scope: "col", class: "number" }, title);
   place.append(h("section", { "aria-label": group }, h("h3", {}, `${group}, ${unit}`), chartPlace,
     h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": `values: ${group}` },
-      h("table", { class: "curve-values" }, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "curve"), column("now"), column("smallest"), column("largest"))), body))));
+      h("table", { class: "curve-values" }, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "curve"), column("latest mean"), column("smallest"), column("largest"))), body))));
   const chart = await curveChart(chartPlace, group, unit);
   const rows = new Map();
   const row = (name) => {
@@ -62,7 +62,8 @@ export async function show(place) {
     for (const name of new Set(data.curves.map((c) => c.group))) {
       const curves = data.curves.filter((c) => c.group === name);
       if (!groups.has(name)) groups.set(name, groupOf(charts, name, curves[0].unit, draw));
-      const group = await groups.get(name);
+      // A chart whose script did not load is tried again.
+      const group = await groups.get(name).catch((error) => { groups.delete(name); throw error; });
       if (ended) return;
       group.show(data, curves, clock.begin_ms, range);
     }
@@ -80,8 +81,9 @@ export async function show(place) {
   const refresh = async () => {
     if (paused || document.hidden) return;
     // Without an answer the axis moves on: what is missing stays open.
-    await ask().catch((error) => { if (!state.lost) notice.textContent = error.message; });
-    await draw();
+    const show = (error) => { if (!state.lost) notice.textContent = error.message; };
+    await ask().catch(show);
+    await draw().catch(show);
   };
 
   const choices = windows.map((w) => h("button", { type: "button", "aria-pressed": String(w === window), onclick: () => choose(w) }, w.title));

@@ -25,7 +25,7 @@ constexpr std::chrono::milliseconds kWithinBurst{10};
 constexpr double kSameRate = 0.03;
 constexpr std::chrono::seconds kShortestSpan{1};
 /// A rate this near to a whole number of points per second is that number.
-constexpr double kWholeRate = 2e-3;
+constexpr double kSameStep = 0.05;  // of the mean over all lines
 
 constexpr std::array<LineSplit, 7> kSplits{
     {{'\t', '.'}, {'\t', ','}, {' ', '.'}, {' ', ','}, {';', '.'}, {';', ','}, {',', '.'}}};
@@ -203,14 +203,21 @@ void find_bursts(const std::vector<SurveyedLine>& all, LineFindings& out) {
   out.burst_period = *middle;
 }
 
-double point_rate_hz(const std::vector<SurveyedColumn>& columns) {
+/// 0 unless one column is a time, and its usual step is that of most lines: a sender with jitter
+/// has no rate that gaps can be found with.
+double point_rate_hz(const std::vector<SurveyedColumn>& columns, std::size_t rows) {
   if (std::ranges::count_if(columns, [](const auto& c) { return c.time.has_value(); }) != 1)
     return 0.0;
   const auto& column =
       *std::ranges::find_if(columns, [](const auto& c) { return c.time.has_value(); });
+  const auto steps = static_cast<double>(rows - 1);
+  if (std::abs(column.step * steps / (column.greatest - column.least) - 1.0) > kSameStep)
+    return 0.0;
+
   const double rate_hz = 1.0 / (column.step * seconds_per(*column.time));
   const double whole_hz = std::round(rate_hz);
-  return std::abs(rate_hz - whole_hz) <= kWholeRate * rate_hz ? whole_hz : rate_hz;
+  // At the whole rate the last line would be less than one step from where it is.
+  return std::abs(rate_hz / whole_hz - 1.0) * steps < 1.0 ? whole_hz : rate_hz;
 }
 
 }  // namespace
@@ -261,7 +268,7 @@ LineFindings LineSurvey::findings(std::optional<LineSplit> split) const {
   out.different += lines_.size() - rows.rows.size();
   for (std::size_t c = 0; c < rows.column_count; ++c)
     out.columns.push_back(survey_column(rows, c, used.decimal_sign));
-  out.point_rate_hz = point_rate_hz(out.columns);
+  out.point_rate_hz = point_rate_hz(out.columns, rows.rows.size());
   return out;
 }
 

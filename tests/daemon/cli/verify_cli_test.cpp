@@ -130,8 +130,16 @@ limit_max_um = 0.001
                     HasSubstr("E. Abbe"), HasSubstr("neither")));
 }
 
+TEST_F(VerifyCli, ALimitThatFailsHasItsExitCode) {
+  write("certificate.toml",
+        "[verification]\ndate = \"2026-11-26\"\nu_um = 0.01\nlimit_rms_um = 0.02\n");
+  const auto ran = abbe("verify model.json --points verification.csv --details certificate.toml");
+  EXPECT_EQ(ran.exit, 5) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("limit 0.02 um: fail"));
+}
+
 TEST_F(VerifyCli, RefusesDetailsThatCannotBe) {
-  write("limit.toml", "[verification]\nlimit_rms_um = 8\n");
+  write("limit.toml", "[verification]\ndate = \"2026-11-26\"\nlimit_rms_um = 8\n");
   const auto without_u = abbe("verify model.json --points verification.csv --details limit.toml");
   EXPECT_NE(without_u.exit, 0);
   EXPECT_THAT(without_u.err, HasSubstr("limit_rms_um: needs u_um"));
@@ -142,7 +150,7 @@ TEST_F(VerifyCli, RefusesDetailsThatCannotBe) {
   EXPECT_THAT(future.err, HasSubstr("2999-01-01 is in the future"));
 
   write("old.toml",
-        "[verification]\ndate = \"2026-11-26\"\n[[equipment]]\nname = \"tracker\"\n"
+        "[verification]\n[[equipment]]\nname = \"tracker\"\n"
         "used = \"verification\"\nvalid_until = \"2026-03-31\"\n");
   const auto old = abbe("verify model.json --points verification.csv --details old.toml");
   EXPECT_NE(old.exit, 0);
@@ -158,6 +166,21 @@ std::vector<calib::verify::MeasuredPoint> points_of(const ModelDocument& documen
     points.push_back({q, q + tool + document.model.V_at(q, tool)});
   }
   return points;
+}
+
+TEST_F(VerifyCli, ALikelyMistakeIsInTheReportAndNoPass) {
+  const auto document = test::synthetic_document(3);
+  write("tables.json", to_json(document));
+  auto points = points_of(document);
+  for (auto& point : points) point.reading_m.head<2>() *= -1.0;
+  write("reversed.csv", to_verification_csv(points));
+  write("certificate.toml",
+        "[verification]\ndate = \"2026-11-26\"\nu_um = 1\nlimit_max_um = 1e6\n");
+  const auto ran =
+      abbe("verify tables.json --points reversed.csv --details certificate.toml -o out");
+  ASSERT_THAT(ran.out, HasSubstr("mistake?")) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("limit 1e+06 um: neither"));
+  EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr("A mistake in the file is likely"));
 }
 
 TEST_F(VerifyCli, TakesAModelOfTables) {

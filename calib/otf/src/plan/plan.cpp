@@ -111,14 +111,11 @@ Result<Path> improved(const PlanProblem& problem, Path path, std::span<const Vec
   constexpr std::size_t kSteps = 40;
   const PlannedRun& run = problem.run();
   return exchange_vertices(problem, std::move(path), lattice, budget, options)
-      .and_then([&](const Path& exchanged) -> Result<Path> {
-        if (is_enough(options)) {
-          return exchanged;
-        }
+      .and_then([&](const Path& exchanged) {
         const double most_m =
             most_before_rounding_m(budget, run.drive, exchanged.vertices_m.size() - 1);
         return descend(problem, exchanged, fixed_vertices(exchanged, run.machine.nodes), most_m,
-                       kSteps, options.stopped);
+                       kSteps, options);
       });
 }
 
@@ -144,8 +141,11 @@ Result<PlannedPath> plan(const PlannedRun& run, const PathBudget& budget,
 
   *path = reach_corners(problem, *std::move(path), budget);
   const double walk_value = problem.state_of(*path).value_m2;
+  bool ended_early = false;
   if (options.exchanges > 0) {
-    path = improved(problem, *std::move(path), lattice, budget, options);
+    PlanOptions improving = options;
+    improving.enough = [&] { return ended_early = ended_early || is_enough(options); };
+    path = improved(problem, *std::move(path), lattice, budget, improving);
   }
   ABBE_TRY(path);
 
@@ -159,7 +159,7 @@ Result<PlannedPath> plan(const PlannedRun& run, const PathBudget& budget,
   return PlannedPath{.path = *path,
                      .walk_rms_u_m = std::sqrt(walk_value),
                      .rms_u_m = std::sqrt(problem.state_of(*path).value_m2),
-                     .ended_early = options.exchanges > 0 && is_enough(options),
+                     .ended_early = ended_early,
                      .corners_not_reached = kCorners - corners_reached(*path, nodes)};
 }
 

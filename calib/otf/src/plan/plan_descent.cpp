@@ -159,7 +159,7 @@ void keep_length(VertexVectors& step, const Path& path, const std::vector<bool>&
 }  // namespace
 
 Result<Path> descend(const PlanProblem& problem, Path path, const std::vector<bool>& fixed,
-                     double most_m, std::size_t most_steps, const Stopped& stopped) {
+                     double most_m, std::size_t most_steps, const PlanOptions& options) {
   // Movement of the farthest vertex in one step.
   constexpr double kFirst_m = 0.01, kLargest_m = 0.05, kLeast_m = 0.2e-3;
   const TravelBox box = box_of(problem.run().machine.nodes);
@@ -168,7 +168,10 @@ Result<Path> descend(const PlanProblem& problem, Path path, const std::vector<bo
   double move_m = kFirst_m;
 
   for (std::size_t i = 0; i < most_steps && move_m >= kLeast_m; ++i) {
-    ABBE_TRY(check_stopped(stopped));
+    if (is_enough(options)) {
+      break;
+    }
+    ABBE_TRY(check_stopped(options.stopped));
 
     state = problem.with_slope(std::move(state));
     VertexVectors step = descent(problem, state, path);

@@ -11,8 +11,9 @@ namespace abbe::calib::otf {
 
 /// Moves the vertices along the projected gradient of trace(G C), inside the travel, with a path no
 /// longer than `most_m`. Vertices with `fixed` stay. The value never increases, unless the path was
-/// longer than `most_m` before. NotConverged if stopped.
+/// longer than `most_m` before. Ends early where PlanOptions::enough is true. NotConverged if
+/// stopped.
 [[nodiscard]] Result<Path> descend(const PlanProblem&, Path, const std::vector<bool>& fixed,
-                                   double most_m, std::size_t most_steps, const Stopped&);
+                                   double most_m, std::size_t most_steps, const PlanOptions&);
 
 }  // namespace abbe::calib::otf

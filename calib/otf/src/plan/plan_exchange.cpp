@@ -305,10 +305,10 @@ Result<Path> exchange_vertices(const PlanProblem& problem, Path path,
     std::vector<Exchange> done;
 
     for (std::size_t i = 0; i < found.size() && evaluated < most && done.size() < kAccepted; ++i) {
-      ABBE_TRY(check_stopped(options.stopped));
       if (is_enough(options)) {
         return path;
       }
+      ABBE_TRY(check_stopped(options.stopped));
       Exchange e = found[i];
       if (!std::all_of(done.begin(), done.end(), [&](const Exchange& d) { return adapt(e, d); }) ||
           !failed.insert(key_of(path, e)).second) {

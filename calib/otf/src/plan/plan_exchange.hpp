@@ -9,10 +9,6 @@
 
 namespace abbe::calib::otf {
 
-[[nodiscard]] inline bool is_enough(const PlanOptions& options) {
-  return options.enough && options.enough();
-}
-
 /// First visits of the corners of the travel, and the first vertex: they stay where they are.
 [[nodiscard]] std::vector<bool> fixed_vertices(const Path&, const MachineNodes&);
 

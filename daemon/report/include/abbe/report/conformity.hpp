@@ -1,6 +1,6 @@
 #pragma once
 /// Whether values of a model are within stated limits, with the guard band of ISO 14253-1: the
-/// expanded uncertainty U (k = 2) narrows the range in which conformity is proven, and that in
+/// expanded uncertainty U narrows the range in which conformity is proven, and that in
 /// which non-conformity is.
 
 #include <string>

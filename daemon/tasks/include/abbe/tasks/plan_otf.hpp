@@ -28,7 +28,8 @@ struct PlanOtfArguments {
   calib::otf::Drive drive;
   std::size_t lattice = calib::otf::PlanOptions{}.lattice,
               exchanges = calib::otf::PlanOptions{}.exchanges;
-  /// True: the path found so far is the result. Empty: never.
+  /// True: the path found so far is the result; DataInsufficient if there is none yet. Empty:
+  /// never.
   std::function<bool()> enough{};
 };
 

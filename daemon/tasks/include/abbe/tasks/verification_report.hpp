@@ -69,8 +69,8 @@ struct JudgedResidual {
   double value_um = 0.0, U_um = 0.0, limit_um = 0.0;
   Conformity conformity = Conformity::Neither;
 };
-/// With the guard band of ISO 14253-1, and U of calib::verify::expanded_uncertainty(). Empty: no
-/// limits are stated.
+/// With the guard band of ISO 14253-1, and U of calib::verify::expanded_uncertainty(). Never a pass
+/// while a usual mistake is likely or points are missing. Empty: no limits are stated.
 [[nodiscard]] std::vector<JudgedResidual> judged_residuals(const Verification&);
 /// "rms 3.214 um, U 2.8 um, limit 8 um: pass"
 [[nodiscard]] std::string to_text(const JudgedResidual&);

@@ -12,10 +12,10 @@ struct ResidualU {
 };
 
 /// `u_m`: standard uncertainty of each coordinate of a measured point; places >= 1.
-/// The error e of a place has |e|^2 / u^2 distributed as chi-square with 3 degrees of freedom.
-/// rms: the same error at all places, the worst correlation, so that more places do not make U
-/// smaller. Largest: no place has an error beyond U; each of them with probability 0.05 / places
-/// (Bonferroni).
+/// Nothing is known of correlations, so that the worst are taken. One cause may move the three
+/// coordinates of a place together: its error e has |e| = sqrt(3) u |z| with z standard normal.
+/// rms: the same error at all places, so that more places do not make U smaller. Largest: no place
+/// has an error beyond U; each of them has one with probability 0.05 / places (Bonferroni).
 [[nodiscard]] ResidualU expanded_uncertainty(double u_m, std::size_t places);
 
 }  // namespace abbe::calib::verify

@@ -42,7 +42,8 @@ struct PlanOptions {
   /// 0.0819 um with 12,000 and to 0.0815 um with 18,000.
   std::size_t exchanges = 12'000;
   Stopped stopped = {};  ///< as Options::stopped
-  /// True: exchange and descent end, and the path found so far is the result. Empty: never.
+  /// True: exchange and descent end, and the path found so far is the result; asked before
+  /// `stopped`. Empty: never.
   Stopped enough = {};
   /// Share of the exchanges, 0 to 1, and the estimate of the path found so far.
   std::function<void(double share, double rms_u_m)> progress = {};

@@ -62,9 +62,10 @@ std::vector<AxisMistake> mistakes_of_errors() {
 Result<void> check_one_shape(const Observations& o) {
   constexpr double kLeast_m = 1e-6;
   const double given_m = shape_scatter_m(o, Matrix3::Identity());
-  // Errors that do not fit the readings at all fit best if they are made small: no mistake.
+  // Errors that do not fit the readings at all fit best if they are made small: no mistake. Nothing
+  // fits better than readings that are one shape already, for example nominal places.
   const double without_m = shape_scatter_m(o, Matrix3::Zero());
-  double best_m = std::max(kFarBetter * std::min(given_m, without_m), kLeast_m / 10.0);
+  double best_m = kFarBetter * std::min(given_m, without_m);
   std::string text;
 
   for (const AxisMistake& mistake : mistakes_of_errors()) {

@@ -123,7 +123,7 @@ TEST_F(CliBacklash, DirectionIsRefusedWhereItHasNoMeaning) {
 TEST_F(CliBacklash, IsShownAndCompared) {
   ASSERT_EQ(with_.exit, 0);
   EXPECT_THAT(test::run_abbe(folder_, "model show with/model.json").out,
-              HasSubstr("V depends on the direction of travel (per-table)"));
+              HasSubstr("V depends on the direction of travel (backlash per-table)"));
   const auto compared = [](const std::string& more) {
     return nlohmann::json::parse(
         test::run_abbe(folder_, "model compare with/model.json plain/model.json --json " + more)

@@ -14,7 +14,9 @@ double squares_exceeded_with(double tail) {
   constexpr int kHalvings = 60;
   const double log_tail = std::log(tail);
   double low = 0.0, high = 1.0;
-  while (log_chi2_tail(high, kCauses) > log_tail) high *= 2.0;
+  while (log_chi2_tail(high, kCauses) > log_tail) {
+    high *= 2.0;
+  }
 
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (low + high);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "abbe/calib/geometry/usual_mistakes.hpp"
@@ -18,6 +19,8 @@ using Points = std::vector<MeasuredPoint>;
 constexpr double kDoesNotFit = std::numeric_limits<double>::infinity();
 constexpr double kLeastInside = 0.7;  // share of the points at which the model must be valid
 constexpr std::size_t kFewestOfMistakes = 4;
+constexpr const char* kMirrored =
+    "one axis reversed or two axes swapped (measured points, a left-handed frame)";
 
 /// What points leave.
 struct Left {
@@ -126,8 +129,7 @@ std::vector<Corrected> corrections(std::span<const MeasuredPoint> points, Frame 
                      p.reading_m = mistake.M * p.reading_m;
                    })});
   }
-  all.push_back({"one axis reversed or two axes swapped (measured points, a left-handed frame)",
-                 changed(points, [](MeasuredPoint& p) { p.measured_m.x() *= -1.0; })});
+  all.push_back({kMirrored, changed(points, [](MeasuredPoint& p) { p.measured_m.x() *= -1.0; })});
 
   for (const UnitMistake& mistake : unit_mistakes()) {
     all.push_back({mistake.text + " (measured points)",
@@ -157,17 +159,15 @@ struct Fits {
 Fits fits_of(std::span<const MeasuredPoint> points, Frame frame, const ErrorsAt& errors_at) {
   Fits fits{{}, left_by(points, frame, errors_at), {}};
   std::vector<TriedCorrection> tried;
-  std::vector<std::pair<std::string, double>> rms_of;
+  std::map<std::string, double> rms_of;
   for (const Corrected& c : corrections(points, frame, errors_at)) {
     const Left left = left_by(c.points, frame, errors_at);
     tried.push_back({c.text, left.relative});
-    rms_of.emplace_back(c.text, left.rms_m);
+    rms_of[c.text] = left.rms_m;
   }
   fits.best = far_better(fits.as_given.relative, std::move(tried));
   for (const TriedCorrection& t : fits.best) {
-    const auto same = std::find_if(rms_of.begin(), rms_of.end(),
-                                   [&](const auto& one) { return one.first == t.text; });
-    fits.rms_m.push_back(same->second);
+    fits.rms_m.push_back(rms_of.at(t.text));
   }
   return fits;
 }
@@ -185,9 +185,7 @@ std::string names(const std::vector<TriedCorrection>& best) {
   for (const TriedCorrection& t : best) {
     texts.push_back(t.text);
   }
-  const bool is_mirror = std::any_of(texts.begin(), texts.end(), [](const std::string& text) {
-    return text.find("left-handed") != std::string::npos;
-  });
+  const bool is_mirror = std::find(texts.begin(), texts.end(), kMirrored) != texts.end();
   return is_mirror && texts.size() > kMost
              ? "one axis reversed or two axes swapped (a left-handed frame)"
              : or_list(texts);

@@ -239,33 +239,6 @@ Result<Alignment> align_as_given(const SegmentSeries& series, const Machine& mac
   return a;
 }
 
-Path times(const Matrix3& M, Path path) {
-  for (Vector3& vertex : path.vertices_m) {
-    vertex = M * vertex;
-  }
-  return path;
-}
-
-/// Names the reflections after which the path is inside the travel. A rigid fit does not show which
-/// of these reflections is the mistake.
-std::string reflections(const Path& path, const MachineNodes& travel) {
-  std::vector<std::string> texts;
-  for (const AxisMistake& mistake : axis_mistakes()) {
-    if (mistake.M.determinant() < 0.0 &&
-        outside_travel(times(mistake.M, path).vertices_m, travel).empty()) {
-      texts.push_back(mistake.text);
-    }
-  }
-  return texts.empty()
-             ? "one axis of the path or of the tracker's frame reversed, or two swapped"
-             : or_list(texts) +
-                   ", or with the tracker frame reflected (azimuth or elevation reversed)";
-}
-
-}  // namespace
-
-namespace {
-
 /// The series with other points of the tracker.
 template <class Corrected>
 SegmentSeries with_points(SegmentSeries series, const Corrected& corrected) {
@@ -279,19 +252,6 @@ SegmentSeries with_points(SegmentSeries series, const Corrected& corrected) {
 
 SegmentSeries with_longer_ranges(const SegmentSeries& series, double longer_m) {
   return with_points(series, [&](const Vector3& p) { return with_longer_range(p, longer_m); });
-}
-
-/// "; they fit with zenith angles instead of elevations"; empty if no other meaning of the angles
-/// makes the points fit.
-std::string angles_that_fit(const SegmentSeries& series, const Machine& machine, const Path& path,
-                            const Options& options) {
-  std::vector<std::string> texts;
-  for (const AngleMistake& mistake : angle_mistakes()) {
-    if (align_as_given(with_points(series, mistake.corrected), machine, path, options)) {
-      texts.push_back(mistake.text);
-    }
-  }
-  return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
 /// "; they fit with ranges shorter by 19.05 mm (...)"; empty if no change of the ranges makes the
@@ -320,29 +280,6 @@ std::string range_change_that_fits(const SegmentSeries& series, const Machine& m
 
 }  // namespace
 
-std::string corrections_that_fit(const Path& path, const MachineNodes& travel,
-                                 const std::function<bool(const Path&)>& fits) {
-  std::vector<std::string> texts;
-  if (fits({{path.vertices_m.rbegin(), path.vertices_m.rend()}})) {
-    texts.emplace_back("the path driven backwards");
-  }
-
-  if (fits(times(Vector3(-1.0, 1.0, 1.0).asDiagonal(), path))) {
-    texts.push_back(reflections(path, travel));
-  }
-
-  for (const UnitMistake& mistake : unit_mistakes()) {
-    for (const auto& [factor, file] :
-         {std::pair{mistake.factor, "path"}, {1.0 / mistake.factor, "tracker"}}) {
-      if (fits(times(factor * Matrix3::Identity(), path))) {
-        texts.push_back(message(mistake.text, " (", file, ")"));
-      }
-    }
-  }
-
-  return texts.empty() ? "" : "; they fit with " + or_list(texts);
-}
-
 Result<Alignment> align(const SegmentSeries& series, const Machine& machine, const Path& path,
                         const Options& options) {
   Result<Alignment> a = align_as_given(series, machine, path, options);
@@ -356,7 +293,10 @@ Result<Alignment> align(const SegmentSeries& series, const Machine& machine, con
              align_as_given(series, machine, other, quiet).has_value();
     });
     if (corrections.empty()) {
-      corrections = angles_that_fit(series, machine, path, quiet);
+      corrections = angles_that_fit([&](const AngleMistake& mistake) {
+        const SegmentSeries other = with_points(series, mistake.corrected);
+        return align_as_given(other, machine, path, quiet).has_value();
+      });
     }
     if (corrections.empty()) {
       corrections = range_change_that_fits(series, machine, path, quiet);

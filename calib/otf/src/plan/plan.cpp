@@ -9,6 +9,7 @@
 #include "abbe/calib/otf/plan/plan_observable.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/result/try.hpp"
+#include "plan/is_enough.hpp"
 #include "plan/plan_descent.hpp"
 #include "plan/plan_exchange.hpp"
 #include "plan/plan_lattice.hpp"

@@ -7,6 +7,7 @@
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/result/try.hpp"
+#include "plan/is_enough.hpp"
 
 namespace abbe::calib::otf {
 namespace {

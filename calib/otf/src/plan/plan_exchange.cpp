@@ -10,6 +10,7 @@
 #include "abbe/calib/internal/base/check_stopped.hpp"
 #include "abbe/calib/otf/run/polyline.hpp"
 #include "abbe/result/try.hpp"
+#include "plan/is_enough.hpp"
 #include "plan/plan_lattice.hpp"
 
 namespace abbe::calib::otf {

@@ -9,13 +9,9 @@
 
 #include "abbe/calib/geometry/parameter_layout.hpp"
 #include "abbe/calib/internal/geometry/rigid_body_model.hpp"
-#include "abbe/calib/otf/plan/plan.hpp"
+#include "abbe/calib/otf/plan/plan_prediction.hpp"
 
 namespace abbe::calib::otf {
-
-[[nodiscard]] inline bool is_enough(const PlanOptions& options) {
-  return options.enough && options.enough();
-}
 
 struct Leg {
   Vector3 from_m, to_m;

@@ -1,9 +1,10 @@
 #pragma once
-/// Mistakes in a path file that explain why points do not fit it.
+/// Mistakes in the file of a path or of a tracker that explain why points do not fit the path.
 
 #include <functional>
 #include <string>
 
+#include "abbe/calib/geometry/usual_mistakes.hpp"
 #include "abbe/calib/otf/run/run.hpp"
 
 namespace abbe::calib::otf {
@@ -12,5 +13,9 @@ namespace abbe::calib::otf {
 /// unit of length. "; they fit with the path driven backwards". Empty if none does.
 [[nodiscard]] std::string corrections_that_fit(const Path&, const MachineNodes& travel,
                                                const std::function<bool(const Path&)>& fits);
+
+/// Names the other meanings of the angles for which `fits` returns true: "; they fit with zenith
+/// angles instead of elevations". Empty if none does.
+[[nodiscard]] std::string angles_that_fit(const std::function<bool(const AngleMistake&)>& fits);
 
 }  // namespace abbe::calib::otf

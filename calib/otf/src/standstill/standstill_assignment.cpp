@@ -344,19 +344,6 @@ bool fits_with_points(std::span<const Standstill> standstills, const Corrected& 
   return assign_as_given(changed, machine, path, options).has_value();
 }
 
-/// "; they fit with zenith angles instead of elevations"; empty if no other meaning of the angles
-/// makes the standstills match the positions.
-std::string angles_that_fit(std::span<const Standstill> standstills, const Machine& machine,
-                            const Path& path, const Options& options) {
-  std::vector<std::string> texts;
-  for (const AngleMistake& mistake : angle_mistakes()) {
-    if (fits_with_points(standstills, mistake.corrected, machine, path, options)) {
-      texts.push_back(mistake.text);
-    }
-  }
-  return texts.empty() ? "" : "; they fit with " + or_list(texts);
-}
-
 /// "; they fit with ranges shorter by 19.05 mm (...)" if the radius of a usual reflector, added to
 /// or subtracted from all ranges, makes the standstills match the positions; else empty.
 std::string reflector_that_fits(std::span<const Standstill> standstills, const Machine& machine,
@@ -390,7 +377,9 @@ Result<StandstillAssignment> assign_standstills(std::span<const Standstill> stan
              assign_as_given(standstills, machine, other, options).has_value();
     });
     if (corrections.empty()) {
-      corrections = angles_that_fit(standstills, machine, path, options);
+      corrections = angles_that_fit([&](const AngleMistake& mistake) {
+        return fits_with_points(standstills, mistake.corrected, machine, path, options);
+      });
     }
     if (corrections.empty()) {
       corrections = reflector_that_fits(standstills, machine, path, options);

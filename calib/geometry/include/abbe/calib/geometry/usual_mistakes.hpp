@@ -68,8 +68,8 @@ struct OutsideTravel {
 /// Names the mistakes whose correction puts all points inside the travel: "; all are inside with Y
 /// reversed, or with X and Y swapped". Empty if no correction does, or if no point is farther
 /// outside than 5 % of the shortest travel. A unit is named only if the points, in this unit,
-/// extend over at least half of the travel of an axis. With a travel of
-/// less than 20 mm the travel is in m, with a longer one the points are in um.
+/// extend over at least half of the travel of an axis. Points in um and a travel in m differ by the
+/// same factor: the travel is named if all axes are shorter than 20 mm, else the points.
 [[nodiscard]] std::string corrections_inside_travel(std::span<const Vector3> points_m,
                                                     const MachineNodes& travel);
 

@@ -53,7 +53,7 @@ struct PlannedPath {
   Path path;
   double walk_rms_u_m = 0.0;  ///< estimate after the walk
   double rms_u_m = 0.0;       ///< estimate at the end; predict() states the value of a run
-  bool ended_early = false;   ///< PlanOptions::enough was true
+  bool ended_early = false;   ///< PlanOptions::enough ended exchange or descent
   /// Corners of the travel that the path does not reach. Its model is not valid there.
   std::size_t corners_not_reached = 0;
 };

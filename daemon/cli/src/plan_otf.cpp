@@ -135,7 +135,7 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
 int run(const PlanOtfCommand& arguments) {
   ProgressBar bar(!arguments.json);
   if (arguments.path.empty()) mark_interruptions({SIGINT});
-  const auto plan = plan_otf(arguments, bar.progress());
+  const auto plan = plan_otf(arguments, bar.progress(interrupted));
   bar.clear();
   if (!plan && interrupted()) {
     fmt::print(stderr, "abbe: interrupted before the first path was found\n");
@@ -201,7 +201,6 @@ void add_drive_options(CLI::App& command, PlanOtfCommand& arguments) {
 
 void add_plan_otf(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<PlanOtfCommand>();
-  arguments->enough = interrupted;
   auto* command = parent.add_subcommand(
       "otf",
       "Plan the path of an on-the-fly calibration: the path with the smallest predicted "

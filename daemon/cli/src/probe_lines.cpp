@@ -176,10 +176,8 @@ int run_probe_lines(ProbeLinesArguments& arguments) {
 
   mark_interruptions({SIGINT, SIGTERM});
   ProgressBar bar;
-  const Progress progress{[&bar](std::string_view step, double share) { bar.show(step, share); },
-                          interrupted};
   const drivers::MonotonicTime time;
-  const auto probed = probe_lines(command, time, progress);
+  const auto probed = probe_lines(command, time, bar.progress(interrupted));
   bar.clear();
   if (!probed) return report(probed.error());
   if (probed->findings.lines == 0) {

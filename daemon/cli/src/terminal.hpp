@@ -33,8 +33,9 @@ class ProgressBar {
 
   void show(std::string_view step, double fraction);
   /// Shows what a task reports; the bar must outlive it.
-  [[nodiscard]] Progress progress() {
-    return Progress([this](std::string_view step, double share) { show(step, share); });
+  [[nodiscard]] Progress progress(Progress::Stopped stopped = {}) {
+    return Progress([this](std::string_view step, double share) { show(step, share); },
+                    std::move(stopped));
   }
   void clear();
 

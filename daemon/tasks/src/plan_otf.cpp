@@ -81,12 +81,11 @@ otf::PathBudget budget_of(const PlanOtfArguments& arguments, const otf::Machine&
 /// Compares the tracker positions by quick walks, and sets the best one in `run`.
 Result<std::vector<std::pair<calib::Vector3, double>>> compare_trackers(
     otf::PlannedRun& run, const std::vector<calib::Vector3>& trackers,
-    const otf::PathBudget& budget, const PlanOtfArguments& arguments) {
+    const otf::PathBudget& budget, const otf::Stopped& stopped) {
   std::vector<std::pair<calib::Vector3, double>> compared;
   for (const auto& tracker_m : trackers) {
     run.tracker_m = tracker_m;
-    const auto quick =
-        otf::plan(run, budget, {.lattice = 3, .exchanges = 0, .stopped = arguments.enough});
+    const auto quick = otf::plan(run, budget, {.lattice = 3, .exchanges = 0, .stopped = stopped});
     if (!quick) return tl::make_unexpected(error_of(quick.error()));
     compared.emplace_back(tracker_m, quick->rms_u_m);
   }
@@ -117,6 +116,7 @@ Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& pro
   ABBE_TRY(run);
 
   const otf::PathBudget budget = budget_of(arguments, run->machine);
+  const auto stopped = [&progress] { return progress.stopped(); };
   PathPlan plan{.run = *run};
   plan.run.tracker_m = trackers->front();
   if (!arguments.path.empty()) {
@@ -125,7 +125,7 @@ Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& pro
     plan.path = *std::move(path);
   } else {
     if (trackers->size() > 1) {
-      auto compared = compare_trackers(plan.run, *trackers, budget, arguments);
+      auto compared = compare_trackers(plan.run, *trackers, budget, stopped);
       ABBE_TRY(compared);
       plan.trackers = *std::move(compared);
     }
@@ -134,8 +134,8 @@ Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& pro
         plan.run, budget,
         {.lattice = arguments.lattice,
          .exchanges = arguments.exchanges,
-         .stopped = arguments.enough,  // before there is a path
-         .enough = arguments.enough,
+         .stopped = stopped,  // before there is a path
+         .enough = stopped,
          .progress = [&progress](double share, double rms_u_m) {
            progress.show(fmt::format("{:.4f} um (Ctrl-C: use it)", rms_u_m * kUmPerM), share);
          }});

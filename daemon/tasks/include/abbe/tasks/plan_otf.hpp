@@ -2,7 +2,6 @@
 /// A path for a calibration on the fly, planned or given, with the uncertainty that it will give.
 
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -28,9 +27,6 @@ struct PlanOtfArguments {
   calib::otf::Drive drive;
   std::size_t lattice = calib::otf::PlanOptions{}.lattice,
               exchanges = calib::otf::PlanOptions{}.exchanges;
-  /// True: the path found so far is the result; DataInsufficient if there is none yet. Empty:
-  /// never.
-  std::function<bool()> enough{};
 };
 
 /// A path with its prediction, and the tracker positions that were compared.
@@ -41,11 +37,12 @@ struct PathPlan {
   tl::expected<calib::otf::Prediction, calib::Error> base;
   std::vector<std::pair<calib::Vector3, double>> trackers;  ///< position, rms_u_m
   std::size_t corners_not_reached = 0;
-  bool ended_early = false;  ///< by PlanOtfArguments::enough
+  bool ended_early = false;  ///< by Progress::stopped()
 };
 
-/// With `arguments.path` a prediction of that path, else a new path. Usage: the place of the
-/// tracker is not known.
+/// With `arguments.path` a prediction of that path, else a new path: the best one found until it is
+/// `progress.stopped()`. Usage: the place of the tracker is not known. DataInsufficient: stopped
+/// before there was a path.
 [[nodiscard]] Result<PathPlan> plan_otf(const PlanOtfArguments&, const Progress&);
 
 }  // namespace abbe::daemon

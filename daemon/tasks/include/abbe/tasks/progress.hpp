@@ -22,7 +22,8 @@ class Progress {
   void show(std::string_view step, double share) const {
     if (show_) show_(step, share);
   }
-  /// True: a task that says so returns an Error soon. Once true, it must stay true.
+  /// True: a task that says so returns an Error soon, or what it has found so far. Once true, it
+  /// must stay true.
   [[nodiscard]] bool stopped() const { return stopped_ && stopped_(); }
 
  private:

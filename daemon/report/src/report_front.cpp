@@ -18,11 +18,6 @@ namespace {
 
 using Facts = std::vector<std::pair<std::string, std::string>>;
 
-/// `key`: that of certificate.toml.
-std::string stated(const std::string& text, std::string_view key) {
-  return text.empty() ? fmt::format("not stated ({})", key) : shortened(text);
-}
-
 std::string operator_in_short(const ReportSubject& subject) {
   for (const StoreEvent& event : subject.events)
     if (event.action == StoreAction::Added) return shortened(event.actor.who);
@@ -36,17 +31,6 @@ std::string date_of(const ReportSubject& subject) {
   if (d.begin_date.empty() != d.end_date.empty()) return d.begin_date + d.end_date;
   if (!d.begin_date.empty()) return d.begin_date + " to " + d.end_date;
   return "not known (certificate.begin_date, certificate.end_date)";
-}
-
-std::string instruments_of(const ReportSubject& subject) {
-  std::string text;
-  for (const EquipmentDetails& e : subject.details.equipment) {
-    if (!is_used(e, EquipmentUse::AsFound)) continue;
-    if (!text.empty()) text += ", ";
-    text += e.name;
-    if (!e.serial.empty()) text += " " + e.serial;
-  }
-  return stated(text, "equipment.name, equipment.serial");
 }
 
 std::string temperature_of(const ReportSubject& subject) {
@@ -66,7 +50,8 @@ void add_identity(HtmlReport& page, const ReportSubject& subject) {
   page.facts({{"measured", date_of(subject)},
               {"identified", local_time_text(subject.document.created)},
               {"method", shortened(method_in_words(subject.document))},
-              {"instrument", instruments_of(subject)},
+              {"instrument", stated(instruments_of(d, EquipmentUse::AsFound),
+                                    "equipment.name, equipment.serial")},
               {"temperature", temperature_of(subject)}});
   page.end_columns();
   page.paragraph(
@@ -171,8 +156,7 @@ Result<void> add_front(HtmlReport& page, const ReportSubject& subject,
   const bool all_limits = judged->size() <= kMostLimits;
   add_tolerance(page, *judged);
   add_result(page, subject, values);
-  const CertificateDetails& d = subject.details;
-  add_signature(page, d.role.empty() ? d.person : d.person + ", " + d.role, d.issue_date);
+  add_signature(page, signed_by(subject.details), subject.details.issue_date);
   add_before_and_after(
       page, document.model,
       document.run ? document.run->held_out_cells : std::vector<RunFigures::HeldOutCell>{});

@@ -36,6 +36,24 @@ void add_footer(HtmlReport& page, const ModelDocument& document) {
   page.footer(fmt::format("model {} hash {}", model_id(document), model_hash(document)));
 }
 
+std::string stated(const std::string& text, std::string_view key) {
+  return text.empty() ? fmt::format("not stated ({})", key) : shortened(text);
+}
+
+std::string instruments_of(const CertificateDetails& details, EquipmentUse use) {
+  std::string text;
+  for (const EquipmentDetails& e : details.equipment) {
+    if (!is_used(e, use)) continue;
+    if (!text.empty()) text += ", ";
+    text += e.serial.empty() ? e.name : e.name + " " + e.serial;
+  }
+  return text;
+}
+
+std::string signed_by(const CertificateDetails& details) {
+  return details.role.empty() ? details.person : details.person + ", " + details.role;
+}
+
 void add_signature(HtmlReport& page, const std::string& name, const std::string& date) {
   const std::string line(28, '_');
   page.heading("Signature");

@@ -99,12 +99,12 @@ void read_verification(Section section, VerificationDetails& out) {
   read_number(section, "limit_rms_um", out.limit_rms_um, kPositive);
   read_number(section, "limit_max_um", out.limit_max_um, kPositive);
 
-  for (const std::string_view limit : {"limit_rms_um", "limit_max_um"})
-    if (section.has(limit) && !section.has("u_um"))
+  for (const std::string_view limit : {"limit_rms_um", "limit_max_um"}) {
+    if (!section.has(limit)) continue;
+    if (!section.has("u_um"))
       section.fault(limit, "needs u_um, the standard uncertainty of a measured coordinate");
-  for (const std::string_view limit : {"limit_rms_um", "limit_max_um"})
-    if (section.has(limit) && !section.has("date"))
-      section.fault(limit, "needs date, the day of the measurement");
+    if (!section.has("date")) section.fault(limit, "needs date, the day of the measurement");
+  }
   section.close();
 }
 

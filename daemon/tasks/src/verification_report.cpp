@@ -55,21 +55,6 @@ std::size_t places_improved(const verify::Comparison& c) {
   return improved;
 }
 
-/// Of the instruments that [verification] used.
-std::string instruments_of_verification(const CertificateDetails& details) {
-  std::string text;
-  for (const EquipmentDetails& e : details.equipment) {
-    if (!is_used(e, EquipmentUse::Verification)) continue;
-    if (!text.empty()) text += ", ";
-    text += e.serial.empty() ? e.name : e.name + " " + e.serial;
-  }
-  return text;
-}
-
-std::string known(const std::string& text, std::string_view key) {
-  return text.empty() ? fmt::format("not stated ({})", key) : shortened(text);
-}
-
 void add_identity(HtmlReport& page, const Verification& v) {
   const ModelDocument& document = v.models.front().model.document;
   const std::string measured = v.inputs.empty() ? "at the running machine" : v.inputs.front().name;
@@ -77,15 +62,15 @@ void add_identity(HtmlReport& page, const Verification& v) {
   const VerificationDetails& of = d.verification;
   page.begin_columns();
   page.facts({{"machine", shortened(document.machine)},
-              {"serial number", known(d.machine_serial, "machine.serial")},
-              {"certificate", known(d.number, "certificate.number")},
-              {"customer", known(d.customer.name, "customer.name")},
+              {"serial number", stated(d.machine_serial, "machine.serial")},
+              {"certificate", stated(d.number, "certificate.number")},
+              {"customer", stated(d.customer.name, "customer.name")},
               {"model", model_id(document)},
               {"model identified", local_time_text(document.created)}});
-  page.facts({{"measured", known(of.date, "verification.date")},
-              {"operator", known(of.operator_name, "verification.operator")},
-              {"instrument",
-               known(instruments_of_verification(d), "equipment.name, used = \"verification\"")},
+  page.facts({{"measured", stated(of.date, "verification.date")},
+              {"operator", stated(of.operator_name, "verification.operator")},
+              {"instrument", stated(instruments_of(d, EquipmentUse::Verification),
+                                    "equipment.name, used = \"verification\"")},
               {"temperature", of.temperature_C ? fmt::format("{:g} C", *of.temperature_C)
                                                : "not stated (verification.temperature_C)"},
               {"measured points", shortened(measured)}});
@@ -360,11 +345,6 @@ std::vector<JudgedResidual> judged_residuals(const Verification& v) {
   return judged;
 }
 
-std::string to_text(const JudgedResidual& one) {
-  return fmt::format("{} {:.3f} um, U {:.2g} um, limit {:g} um: {}", one.name, one.value_um,
-                     one.U_um, one.limit_um, name(one.conformity));
-}
-
 std::string verdict_text(const verify::Comparison& c) {
   return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} places improved",
                      words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m,
@@ -399,8 +379,7 @@ std::string verification_report(const Verification& v) {
   add_verdict(page, v);
   add_tolerance(page, v);
   add_left(page, v);
-  const CertificateDetails& d = v.details;
-  add_signature(page, d.role.empty() ? d.person : d.person + ", " + d.role, d.issue_date);
+  add_signature(page, signed_by(v.details), v.details.issue_date);
   page.end_front();
   page.page_break();
   add_farthest(page, v);

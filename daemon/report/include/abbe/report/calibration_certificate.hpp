@@ -29,7 +29,9 @@ namespace abbe::daemon {
 /// Times of the model alone that contradict each other or the present. No details can correct them:
 /// a certificate is refused, a report has them among its notes.
 [[nodiscard]] std::vector<std::string> contradictory_times(const ReportSubject& subject);
-/// Of [verification]: a date in the future, instruments whose calibration was not valid any more.
+
+/// Of [verification]: a date in the future or after the date of issue, and instruments whose
+/// calibration was not valid any more.
 [[nodiscard]] std::vector<std::string> wrong_verification_dates(const CertificateDetails& details);
 
 }  // namespace abbe::daemon

@@ -72,8 +72,6 @@ struct JudgedResidual {
 /// With the guard band of ISO 14253-1, and U of calib::verify::expanded_uncertainty(). Never a pass
 /// while a usual mistake is likely or points are missing. Empty: no limits are stated.
 [[nodiscard]] std::vector<JudgedResidual> judged_residuals(const Verification&);
-/// "rms 3.214 um, U 2.8 um, limit 8 um: pass"
-[[nodiscard]] std::string to_text(const JudgedResidual&);
 
 /// The text of report.html of the first model, a page that needs no other file and begins with the
 /// verdict.

@@ -14,6 +14,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/calib/geometry/rigid_transform.hpp"
 #include "abbe/result/try.hpp"
+#include "row_cells.hpp"
 
 namespace abbe::daemon {
 
@@ -215,21 +216,6 @@ Result<void> check_distances(const TrackerFile& points, const std::filesystem::p
                           file.string(), nearest_m * kMmPerM, where, kNearest_m * kMmPerM, advice));
 }
 
-/// A second fault of a file with one mean for each standstill, so that a person learns of both at
-/// once; else empty.
-std::string means_text(const TrackerFile& points) {
-  constexpr double kFarApart_s = 1.0;
-  if (points.points.size() < 2) return {};
-  const double period_s = (points.points.back().time_s - points.points.front().time_s) /
-                          static_cast<double>(points.points.size() - 1);
-  return period_s < kFarApart_s
-             ? ""
-             : fmt::format(
-                   ". Its rows are {:.3g} s apart: if each is the mean of a standstill, export "
-                   "every measurement instead, because means do not show their scatter",
-                   period_s);
-}
-
 }  // namespace
 
 Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vector3>& centre_m,
@@ -251,8 +237,8 @@ Result<void> place_tracker(TrackerFile& points, const std::optional<calib::Vecto
             "{}: the columns x_mm, y_mm, z_mm do not state their frame, and noise and offset of "
             "the ranges act along the beams. Points in the frame of the tracker: name the columns "
             "tracker_x_mm, tracker_y_mm, tracker_z_mm. Points exported in machine or station "
-            "coordinates: state with {} where the tracker stands in them{}",
-            file.string(), option, means_text(points)));
+            "coordinates: state with {} where the tracker stands in them",
+            file.string(), option));
 
   for (auto& point : points.points) point.p_tracker_m -= *centre_m;
   points.frame = TrackerFile::Frame::Parallel;
@@ -313,10 +299,7 @@ Result<VerificationFile> read_verification_csv(const std::filesystem::path& file
   };
 
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    std::array<double, 6> cells{};
-    for (std::size_t column = 0; column < cells.size(); ++column)
-      cells[column] = table.at(row, column);
-    if (!seen.insert(cells).second) {
+    if (!seen.insert(cells_of<6>(table, row)).second) {
       ++out.repeated;
       continue;
     }

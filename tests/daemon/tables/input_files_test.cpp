@@ -41,16 +41,6 @@ TEST_F(InputFiles, ReadTheCartesianTrackerForm) {
   EXPECT_EQ(tracker->points[1].p_tracker_m, calib::Vector3(-1.0, 0.0005, 0.01));
 }
 
-TEST_F(InputFiles, NameMeansOfStandstillsBesideTheMissingFrame) {
-  auto means = *read_tracker_csv(
-      write("t.csv", "time_s,x_mm,y_mm,z_mm\n0,1000,2000,3000\n5,1100,2000,3000\n"));
-  const auto placed = place_tracker(means, std::nullopt, "t.csv", "--tracker-centre-mm");
-  ASSERT_FALSE(placed);
-  EXPECT_THAT(placed.error().text,
-              AllOf(HasSubstr("do not state their frame"), HasSubstr("Its rows are 5 s apart"),
-                    HasSubstr("means do not show their scatter")));
-}
-
 TEST_F(InputFiles, PlaceTheTrackerInTheFrameOfItsPoints) {
   const std::string option = "--tracker-centre-mm X,Y,Z";
   const auto points = [&](const std::string& columns) {

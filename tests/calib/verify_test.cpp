@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iostream>
 #include <random>
 
 #include "abbe/calib/verify/compare.hpp"
@@ -354,6 +355,51 @@ TEST(Verification, NamesTheAxesOfTheReadingsThatTheModelShows) {
   ASSERT_TRUE(observe(turned, Frame::BestFit, errors_at));
   EXPECT_THAT(likely_mistakes(turned, Frame::BestFit, errors_at),
               testing::ElementsAre(testing::StartsWith("X and Y reversed (readings): ")));
+}
+
+/// Errors of a machine, of the order of 30 um per metre, quadratic in the position.
+ErrorsAt random_errors(std::mt19937& random) {
+  std::normal_distribution<double> size(0.0, 30e-6);
+  Eigen::Matrix<double, 3, 9> c;
+  for (double& x : c.reshaped()) x = size(random);
+  return [c](const Vector3& q) {
+    Eigen::Vector<double, 9> terms;
+    terms << q, q.cwiseAbs2(), q.x() * q.y(), q.y() * q.z(), q.z() * q.x();
+    return std::optional(Vector3(c * terms));
+  };
+}
+
+/// The machine is not any more as the model: some years older, or another one. 4 to 60 places.
+TEST(Verification, NamesNoMistakeInSoundPointsOfAMachineThatChanged) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> part(0.0, 1.0);
+  std::normal_distribution<double> noise(0.0, 2e-6);
+  std::size_t named = 0;
+  for (const int places : {4, 5, 6, 8, 12, 20, 60})
+    for (const Frame frame : {Frame::BestFit, Frame::Machine})
+      for (int machine = 0; machine < 40; ++machine) {
+        const ErrorsAt model = random_errors(random), change = random_errors(random);
+        const double kept = 1.2 * part(random), changed = 1.2 * part(random);
+        const Eigen::Matrix3d R =
+            frame == Frame::Machine
+                ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
+                : Eigen::AngleAxisd(6.0 * part(random),
+                                    Vector3(0.2, part(random), 1.0).normalized())
+                      .toRotationMatrix();
+        std::vector<MeasuredPoint> points;
+        for (int i = 0; i < places; ++i) {
+          const Vector3 q(part(random), 0.7 * part(random), -0.5 * part(random)),
+              scatter(noise(random), noise(random), noise(random));
+          const Vector3 V = kept * *model(q) + changed * *change(q);
+          points.push_back({q, R * (q + V) + Vector3(2.0, -1.0, 0.4) + scatter});
+        }
+        const auto mistakes = likely_mistakes(points, frame, model);
+        named += mistakes.empty() ? 0 : 1;
+        if (!mistakes.empty())
+          std::cout << places << " places, frame " << int(frame) << ": " << mistakes.front()
+                    << '\n';
+      }
+  EXPECT_EQ(named, 0u) << "of 560";
 }
 
 /// All ranges contain the radius of the reflector.

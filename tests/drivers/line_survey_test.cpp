@@ -75,6 +75,18 @@ TEST(LineSurvey, FindsNoRateIfTwoColumnsAdvanceAsTime) {
   EXPECT_EQ(survey_of(print).findings().point_rate_hz, 0.0);
 }
 
+TEST(LineSurvey, FindsNoRateOfASenderWithJitterAndRoundsNoOther) {
+  const auto rate_hz = [](const std::function<double(int)>& time_s) {
+    return survey_of([&](int n) { return fmt::format("{:.6f} 1.5 2.5 3.5", time_s(n)); })
+        .findings()
+        .point_rate_hz;
+  };
+  EXPECT_NEAR(rate_hz([](int n) { return n / 250.4; }), 250.4, 0.05);
+  EXPECT_EQ(rate_hz([](int n) { return 0.004 * n + (n % 9 == 0 ? 0.0039 : 0.0); }), 250.0)
+      << "one late point in nine";
+  EXPECT_EQ(rate_hz([](int n) { return 0.004 * n + (n % 2 == 0 ? 0.0 : 0.003); }), 0.0);
+}
+
 TEST(LineSurvey, FindsSeparatorAndDecimalSign) {
   const auto splits = [](const std::string& line) {
     return survey_of([&](int) { return line; }).findings().splits;

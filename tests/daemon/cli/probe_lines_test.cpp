@@ -172,6 +172,26 @@ TEST_F(ProbeLines, WritesNothingWhileAnythingIsMissing) {
   EXPECT_FALSE(fs::exists(folder_ / "tracker.toml"));
 }
 
+TEST_F(ProbeLines, WritesNoTableThatTheLinesContradict) {
+  const PrintingTracker tracker{{}, kTimeXyzStatus};
+  const auto of =
+      fmt::format("--host 127.0.0.1 --port {}{}-o tracker.toml", tracker.port(), kStated);
+  const auto replaced = [&](const std::string& stated, const std::string& wrong) {
+    std::string arguments = of;
+    return probe(arguments.replace(arguments.find(stated), stated.size(), wrong));
+  };
+  const auto unit = replaced("--time-unit s", "--time-unit ms"),
+             rate = replaced("--point-rate-hz 500", "--point-rate-hz 1000"),
+             status = replaced("--valid-status 1", "--valid-status 7");
+  EXPECT_EQ(unit.exit, 1);
+  EXPECT_THAT(unit.err, HasSubstr("column 1 advances as a time in s, stated is ms"));
+  EXPECT_EQ(rate.exit, 1);
+  EXPECT_THAT(rate.err, HasSubstr("1000 points per second are stated, the time column shows 500"));
+  EXPECT_EQ(status.exit, 1);
+  EXPECT_THAT(status.err, HasSubstr("every point is invalid by its status"));
+  EXPECT_FALSE(fs::exists(folder_ / "tracker.toml"));
+}
+
 TEST_F(ProbeLines, ReportsColumnsThatDoNotFit) {
   const PrintingTracker tracker{{}, kTimeXyzStatus};
   const auto ran =

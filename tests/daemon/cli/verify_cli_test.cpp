@@ -3,25 +3,18 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "abbe/base/control_protocol.hpp"
-#include "abbe/calib/evemu/solve/solve.hpp"
-#include "abbe/methods/evemu/document.hpp"
-#include "abbe/model/model_document.hpp"
-#include "abbe/tables/input_files.hpp"
-#include "abbe_command.hpp"
 #include "config_tables.hpp"
-#include "evemu_study.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_model.hpp"
+#include "verify_cli_fixture.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -34,50 +27,6 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-/// Identified once: it takes seconds, under ThreadSanitizer minutes.
-const std::string& ball_array_document() {
-  static const std::string text = [] {
-    const auto solution = *calib::evemu::solve(
-        study::simulated(study::reference_layout(), study::table3_machine(), {8e-6, 0.0}, 1));
-    Config config;
-    config.machine.name = "weak portal";
-    return to_json(evemu_document(solution, config, {}, {}));
-  }();
-  return text;
-}
-
-/// Every 100, 100 and 20 mm, as in [Li OMM] section 5.4, seen from the tracker.
-std::vector<calib::verify::MeasuredPoint> tracker_points(const study::Field& V) {
-  const calib::RigidTransform T_tracker_machine{
-      Eigen::AngleAxisd(1.1, calib::Vector3(0.2, 0.1, 1.0).normalized()).toRotationMatrix(),
-      calib::Vector3(3.0, -1.0, 0.4)};
-  std::vector<calib::verify::MeasuredPoint> points;
-  for (int x = -100; x <= 600; x += 100)
-    for (int y = -100; y <= 400; y += 100)
-      for (int z = 0; z <= 100; z += 20) {
-        const calib::Vector3 q(1e-3 * x, 1e-3 * y, 1e-3 * z);
-        points.push_back({q, T_tracker_machine * (q + V(q))});
-      }
-  return points;
-}
-
-class VerifyCli : public ::testing::Test {
- protected:
-  void SetUp() override {
-    fs::create_directories(folder_);
-    write("model.json", ball_array_document());
-    write("verification.csv", to_verification_csv(tracker_points(study::table3_machine())));
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-  }
-  Ran abbe(const std::string& arguments) const { return test::run_abbe(folder_, arguments); }
-
-  fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("verify_cli_{}", ::getpid());
-};
 
 TEST_F(VerifyCli, ReportsTheResidualErrorOfAModel) {
   const auto ran = abbe("verify model.json --points verification.csv --json");
@@ -100,87 +49,6 @@ TEST_F(VerifyCli, WritesAReportThatNeedsNoNetwork) {
   EXPECT_THAT(page, AllOf(HasSubstr("Vectors in three planes"), HasSubstr("rigid motion"),
                           HasSubstr("weak portal"), Not(HasSubstr("src=\"http"))));
   EXPECT_THAT(text_of(folder_ / "out/grid.csv"), StartsWith("x_mm,y_mm,z_mm,las_x_um,"));
-}
-
-TEST_F(VerifyCli, JudgesTheLimitsOfTheDetails) {
-  write("certificate.toml", R"([person]
-name = "E. Abbe"
-[[equipment]]
-name = "laser tracker"
-serial = "4711"
-used = "verification"
-[verification]
-date = "2026-11-26"
-operator = "C. Zeiss"
-u_um = 500
-limit_rms_um = 5000
-limit_max_um = 0.001
-)");
-  const auto ran =
-      abbe("verify model.json --points verification.csv --details certificate.toml -o out --json");
-  ASSERT_EQ(ran.exit, 0) << ran.err;
-
-  const auto limits = nlohmann::json::parse(ran.out)["limits"];
-  ASSERT_EQ(limits.size(), 2U);
-  EXPECT_EQ(limits[0]["verdict"], "pass");
-  // The largest residual is below U: the points do not prove that the model fails.
-  EXPECT_EQ(limits[1]["verdict"], "neither");
-  EXPECT_THAT(text_of(folder_ / "out/report.html"),
-              AllOf(HasSubstr("laser tracker 4711"), HasSubstr("C. Zeiss"), HasSubstr("2026-11-26"),
-                    HasSubstr("E. Abbe"), HasSubstr("neither")));
-}
-
-TEST_F(VerifyCli, ALimitThatFailsHasItsExitCode) {
-  write("certificate.toml",
-        "[verification]\ndate = \"2026-11-26\"\nu_um = 0.01\nlimit_rms_um = 0.02\n");
-  const auto ran = abbe("verify model.json --points verification.csv --details certificate.toml");
-  EXPECT_EQ(ran.exit, 5) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("limit 0.02 um: fail"));
-}
-
-TEST_F(VerifyCli, RefusesDetailsThatCannotBe) {
-  write("limit.toml", "[verification]\ndate = \"2026-11-26\"\nlimit_rms_um = 8\n");
-  const auto without_u = abbe("verify model.json --points verification.csv --details limit.toml");
-  EXPECT_NE(without_u.exit, 0);
-  EXPECT_THAT(without_u.err, HasSubstr("limit_rms_um: needs u_um"));
-
-  write("future.toml", "[verification]\ndate = \"2999-01-01\"\n");
-  const auto future = abbe("verify model.json --points verification.csv --details future.toml");
-  EXPECT_NE(future.exit, 0);
-  EXPECT_THAT(future.err, HasSubstr("2999-01-01 is in the future"));
-
-  write("old.toml",
-        "[verification]\n[[equipment]]\nname = \"tracker\"\n"
-        "used = \"verification\"\nvalid_until = \"2026-03-31\"\n");
-  const auto old = abbe("verify model.json --points verification.csv --details old.toml");
-  EXPECT_NE(old.exit, 0);
-  EXPECT_THAT(old.err, HasSubstr("valid until 2026-03-31"));
-}
-
-/// A grid in the volume of the model, measured without noise.
-std::vector<calib::verify::MeasuredPoint> points_of(const ModelDocument& document) {
-  std::vector<calib::verify::MeasuredPoint> points;
-  const auto tool = document.model.tool_offsets_m().front();
-  for (int i = 0; i < 343; ++i) {
-    const calib::Vector3 q(-0.3 + 0.1 * (i % 7), -0.3 + 0.1 * (i / 7 % 7), -0.4 + 0.05 * (i / 49));
-    points.push_back({q, q + tool + document.model.V_at(q, tool)});
-  }
-  return points;
-}
-
-TEST_F(VerifyCli, ALikelyMistakeIsInTheReportAndNoPass) {
-  const auto document = test::synthetic_document(3);
-  write("tables.json", to_json(document));
-  auto points = points_of(document);
-  for (auto& point : points) point.reading_m.head<2>() *= -1.0;
-  write("reversed.csv", to_verification_csv(points));
-  write("certificate.toml",
-        "[verification]\ndate = \"2026-11-26\"\nu_um = 1\nlimit_max_um = 1e6\n");
-  const auto ran =
-      abbe("verify tables.json --points reversed.csv --details certificate.toml -o out");
-  ASSERT_THAT(ran.out, HasSubstr("mistake?")) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("limit 1e+06 um: neither"));
-  EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr("A mistake in the file is likely"));
 }
 
 TEST_F(VerifyCli, TakesAModelOfTables) {

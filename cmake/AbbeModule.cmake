@@ -15,6 +15,7 @@ target_compile_options(abbe_warnings INTERFACE
 # Options with which the fuzzer and ThreadSanitizer observe a program. abbe_compile_mathematics()
 # removes them from targets in which they find nothing.
 set(abbe_observing_options "")
+set(abbe_sanitizing_options "")
 if(ABBE_SANITIZE MATCHES "thread")
   list(APPEND abbe_observing_options -fsanitize=thread -fno-omit-frame-pointer -O1 -g1 -UNDEBUG)
   add_link_options(-fsanitize=thread)

@@ -59,6 +59,9 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, const Progre
   auto read = read_machine_and_path(arguments);
   ABBE_TRY(read);
 
+  const auto machine = otf_machine(read->config.machine);
+  ABBE_TRY(machine);
+
   TargetRuns all{std::move(*read)};
   for (const auto& text : arguments.targets) {
     const auto target = parse_target(text);
@@ -67,8 +70,6 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, const Progre
       progress.show(fmt::format("reading {}", target->second), fraction);
     });
     ABBE_TRY(tracker);
-    const auto machine = otf_machine(all.config.machine);
-    ABBE_TRY(machine);
     ABBE_TRY(check_length_unit(target->second, *tracker, all.path, machine->nodes));
     ABBE_TRY(check_time_unit(target->second, *tracker, all.path));
     ABBE_TRY(place_tracker(*tracker, arguments.tracker_centre_m(all.runs.size()), target->second,

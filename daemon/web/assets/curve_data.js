@@ -88,7 +88,7 @@ export function summary({ mean, min, max }, most_age) {
     min: newest < 0 ? null : Math.min(...known(min)), max: newest < 0 ? null : Math.max(...known(max)) };
 }
 
-/** At most six significant digits, without a sum of more decimals than the unit has use for. */
+/** At most six significant digits, and no more decimals than the unit needs. */
 export function valueText(value, unit) {
   if (value === null) return "-";
   const decimals = { mm: 4, "\u00b0": 4, "\u00b0C": 2, hPa: 2, "%": 1 }[unit] ?? 3;

@@ -157,10 +157,6 @@ drivers::LineAddress read_address(ClassifiedSection& section) {
   return peer;
 }
 
-}  // namespace
-
-namespace {
-
 std::string toml_text(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {

@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 
+#include "abbe/base/daemon_poll.hpp"
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/limited_log.hpp"
 #include "abbe/base/message.hpp"
@@ -21,19 +22,18 @@
 #include "abbe/base/standard_error.hpp"
 #include "abbe/base/wall_clock.hpp"
 #include "abbe/config/mtconnect_config.hpp"
-#include "abbe/mtconnect/daemon_poll.hpp"
 #include "abbe/mtconnect/shdr_feed.hpp"
 #include "abbe/mtconnect/shdr_server.hpp"
 
 namespace {
 
 using namespace std::chrono_literals;
+using abbe::daemon::DaemonPoll;
 using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 using abbe::daemon::ExitCode;
 using abbe::daemon::MtconnectSettings;
 using abbe::daemon::utc_now;
-using abbe::mtconnect::DaemonPoll;
 using abbe::mtconnect::ShdrFeed;
 using abbe::mtconnect::ShdrServer;
 

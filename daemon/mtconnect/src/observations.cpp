@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "abbe/base/units.hpp"
-#include "conditions.hpp"
 
 namespace abbe::mtconnect {
 namespace {
@@ -84,9 +83,9 @@ Observations observations_of(const json& status) {
   observe_session(status.at("session"), out);
   observe_model(status.at("model"), out);
   out["simulated"] = simulated(status);
-  out["devices"] = std::optional(device_condition(status));
-  out["system"] = std::optional(system_condition(status));
-  out["calibration"] = std::optional(model_condition(status));
+  out["devices"] = std::optional(daemon::device_condition(status));
+  out["system"] = std::optional(daemon::system_condition(status));
+  out["calibration"] = std::optional(daemon::model_condition(status));
   return out;
 }
 

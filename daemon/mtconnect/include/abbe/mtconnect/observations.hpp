@@ -9,6 +9,8 @@
 #include <string>
 #include <variant>
 
+#include "abbe/base/status_conditions.hpp"
+
 namespace abbe::mtconnect {
 
 struct Message {
@@ -16,16 +18,9 @@ struct Message {
   friend bool operator==(const Message&, const Message&) = default;
 };
 
-enum class Level { Warning, Fault };
-
-struct Raised {
-  Level level = Level::Warning;
-  std::string text;
-  friend bool operator==(const Raised&, const Raised&) = default;
-};
-
-/// What is raised, by native code. Empty: NORMAL.
-using Condition = std::map<std::string, Raised>;
+using daemon::Condition;
+using daemon::Level;
+using daemon::Raised;
 
 /// An event, a message or a condition. nullopt: UNAVAILABLE, because abbed is away or has no such
 /// value.

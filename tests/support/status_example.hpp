@@ -1,5 +1,6 @@
 #pragma once
-/// An answer of abbed to "status", with the members that the adapter reads.
+/// An answer of abbed to "status", with the members that abbe-mtconnect and
+/// abbe-notify read.
 
 #include <nlohmann/json.hpp>
 
@@ -18,6 +19,7 @@ inline nlohmann::json stream(const char* name, const char* state, bool connected
 inline nlohmann::json status() {
   return {
       {"ok", true},
+      {"process", 4711},
       {"simulated", false},
       {"model",
        {{"state", "ACTIVE"},

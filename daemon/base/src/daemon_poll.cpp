@@ -1,4 +1,4 @@
-#include "abbe/mtconnect/daemon_poll.hpp"
+#include "abbe/base/daemon_poll.hpp"
 
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -10,19 +10,17 @@
 
 #include "abbe/base/control_protocol.hpp"
 
-namespace abbe::mtconnect {
+namespace abbe::daemon {
 namespace {
 
-using daemon::ErrorCode;
+// Longer than the hub's longest cycle under load, shorter than two heartbeats of MTConnect.
+constexpr std::chrono::seconds kStatusTimeOut{2};
 
-// Longer than the hub's longest cycle under load, shorter than two heartbeats.
-constexpr std::chrono::seconds kTimeOut{2};
-
-DaemonPoll::Answer ask(const std::filesystem::path& socket) {
+DaemonPoll::Answer ask_for_status(const std::filesystem::path& socket) {
   try {
-    return daemon::ask_daemon(socket, {{"do", "status"}}, kTimeOut);
+    return ask_daemon(socket, {{"do", "status"}}, kStatusTimeOut);
   } catch (const std::exception& error) {
-    return daemon::fail(ErrorCode::Io, std::string{"ask abbed: "} + error.what());
+    return fail(ErrorCode::Io, std::string{"ask abbed: "} + error.what());
   }
 }
 
@@ -54,7 +52,7 @@ void DaemonPoll::run() {
   std::unique_lock lock(mutex_);
   while (!stopping_) {
     lock.unlock();
-    Answer answer = ask(socket_);
+    Answer answer = ask_for_status(socket_);
     lock.lock();
 
     answer_ = std::move(answer);
@@ -64,4 +62,4 @@ void DaemonPoll::run() {
   }
 }
 
-}  // namespace abbe::mtconnect
+}  // namespace abbe::daemon

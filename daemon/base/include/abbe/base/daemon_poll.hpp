@@ -1,6 +1,6 @@
 #pragma once
 /// Asks abbed for its status once a second, on a thread of its own: an abbed that hangs must not
-/// delay the heartbeat of the agents.
+/// delay what the process does beside it. For abbe-mtconnect and abbe-notify.
 
 #include <chrono>
 #include <condition_variable>
@@ -13,11 +13,11 @@
 #include "abbe/base/error.hpp"
 #include "abbe/base/file_descriptor.hpp"
 
-namespace abbe::mtconnect {
+namespace abbe::daemon {
 
 class DaemonPoll {
  public:
-  using Answer = daemon::Result<nlohmann::json>;
+  using Answer = Result<nlohmann::json>;
 
   explicit DaemonPoll(std::filesystem::path control_socket,
                       std::chrono::milliseconds period = std::chrono::seconds{1});
@@ -35,7 +35,7 @@ class DaemonPoll {
 
   std::filesystem::path socket_;
   std::chrono::milliseconds period_;
-  daemon::FileDescriptor wake_;
+  FileDescriptor wake_;
   std::mutex mutex_;
   std::condition_variable stop_requested_;
   bool stopping_ = false;
@@ -43,4 +43,4 @@ class DaemonPoll {
   std::thread thread_;
 };
 
-}  // namespace abbe::mtconnect
+}  // namespace abbe::daemon

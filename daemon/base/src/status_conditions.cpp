@@ -1,4 +1,4 @@
-#include "conditions.hpp"
+#include "abbe/base/status_conditions.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cctype>
 #include <string_view>
 
-namespace abbe::mtconnect {
+namespace abbe::daemon {
 namespace {
 
 using nlohmann::json;
@@ -106,4 +106,4 @@ Condition model_condition(const json& status) {
   return out;
 }
 
-}  // namespace abbe::mtconnect
+}  // namespace abbe::daemon

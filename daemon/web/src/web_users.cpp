@@ -6,12 +6,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <ctime>
 #include <memory>
 #include <sstream>
 
+#include "abbe/base/secret_file.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/result/try.hpp"
 
@@ -59,17 +58,6 @@ bool same_text(std::string_view a, std::string_view b) {
   return different == 0;
 }
 
-Result<void> check_mode(const std::filesystem::path& file) {
-  struct stat seen {};
-  if (::stat(file.c_str(), &seen) != 0)
-    return daemon::fail(ErrorCode::Io,
-                        fmt::format("read {}: {}", file.string(), std::strerror(errno)));
-  if ((seen.st_mode & (S_IRWXO | S_IWGRP)) == 0) return {};
-  return daemon::fail(ErrorCode::BadInput,
-                      fmt::format("{}: other users may read or change it: chmod 0640 {}",
-                                  file.string(), file.string()));
-}
-
 /// nullopt for a line that is not NAME:ROLE:HASH.
 std::optional<WebUser> user_of_line(const std::string& line) {
   const auto first = line.find(':');
@@ -95,7 +83,7 @@ std::optional<WebRole> web_role_named(std::string_view name) noexcept {
 }
 
 Result<std::vector<WebUser>> read_web_users(const std::filesystem::path& file) {
-  ABBE_TRY(check_mode(file));
+  ABBE_TRY(daemon::check_secret_mode(file));
   const auto text = daemon::read_regular_file(file);
   ABBE_TRY(text);
 

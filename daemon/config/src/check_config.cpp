@@ -71,6 +71,11 @@ void check_paths(Section& root, const Config& config) {
   check_dds_files(root.child("dds"), config.dds);
 }
 
+/// abbed does not read these files: a missing one is no reason not to start.
+void check_files_of_notify(Section notify, const fs::path& base) {
+  check_notify_files(notify, read_notify(notify, base));
+}
+
 // ---- The improbable ----
 
 constexpr double kLongTravel_m = 50.0;
@@ -220,6 +225,7 @@ Result<CheckedConfig> check_config(const fs::path& file, int cpus) {
   CheckedConfig checked{
       .config = read_all(root, file.parent_path()), .warnings = {}, .of_the_example = {}};
   check_paths(root, checked.config);
+  if (!faults.any()) check_files_of_notify(root.child("notify"), file.parent_path());
   if (faults.any()) return tl::make_unexpected(faults.to_error());
 
   checked.warnings = warnings_of(*table, checked.config, cpus, file.string());

@@ -26,9 +26,10 @@ Config read_all(const Section& file, const std::filesystem::path& base) {
   read_evemu(root, config);
   read_mfb(root, config);
   read_control(root, base, config);
-  // Checked only: abbe-web and abbe-mtconnect use them.
+  // Checked only: abbe-web, abbe-mtconnect and abbe-notify use them.
   (void)read_web(root.operation_table("web"), base);
   (void)read_mtconnect(root.operation_table("mtconnect"));
+  (void)read_notify(root.operation_table("notify"), base);
   for (const ConfigKind& kind : config_kinds())
     if (kind.state != nullptr) kind.state(root, config);
   root.close();

@@ -4,6 +4,7 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/mtconnect_config.hpp"
+#include "abbe/config/notify_config.hpp"
 #include "abbe/config/web_config.hpp"
 #include "abbe/settings/bounded_toml.hpp"
 #include "abbe/settings/section.hpp"
@@ -30,5 +31,8 @@ void read_mfb(ClassifiedSection& root, Config& out);
 void read_control(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 [[nodiscard]] WebConfig read_web(Section section, const std::filesystem::path& base);
 [[nodiscard]] MtconnectConfig read_mtconnect(Section section);
+[[nodiscard]] NotifyConfig read_notify(Section section, const std::filesystem::path& base);
+/// Adds a fault for each file of [notify] that is missing or that other users may read.
+void check_notify_files(Section section, const NotifyConfig& config);
 
 }  // namespace abbe::daemon

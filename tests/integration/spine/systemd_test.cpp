@@ -13,8 +13,8 @@ constexpr double kExposedAtMost = 3.0;  // of 10; systemd calls it OK
 struct Systemd : Spine {
   void SetUp() override {
     if (!std::filesystem::exists(kAnalyze)) GTEST_SKIP() << kAnalyze << " is missing";
-    for (const std::string unit :
-         {"abbed.service", "abbe-dds.service", "abbe-web.service", "abbe-mtconnect.service"}) {
+    for (const std::string unit : {"abbed.service", "abbe-dds.service", "abbe-web.service",
+                                   "abbe-mtconnect.service", "abbe-notify.service"}) {
       std::string text = text_of(std::filesystem::path{ABBE_UNIT_DIR} / unit);
       const std::string installed = "ExecStart=/usr/bin/";
       const auto at = text.find(installed);
@@ -37,7 +37,8 @@ TEST_F(Systemd, FindsNothingWrongWithTheUnits) {
                                    "--man=no",
                                    file("abbed.service"),
                                    file("abbe-web.service"),
-                                   file("abbe-mtconnect.service")};
+                                   file("abbe-mtconnect.service"),
+                                   file("abbe-notify.service")};
 #ifdef ABBE_WITH_DDS
   command.push_back(file("abbe-dds.service"));
 #endif
@@ -87,6 +88,7 @@ TEST_F(Systemd, UnitsAreHardened) {
   EXPECT_LE(exposure("abbe-dds.service"), kExposedAtMost);
   EXPECT_LE(exposure("abbe-web.service"), kExposedAtMost);
   EXPECT_LE(exposure("abbe-mtconnect.service"), kExposedAtMost);
+  EXPECT_LE(exposure("abbe-notify.service"), kExposedAtMost);
 }
 
 }  // namespace

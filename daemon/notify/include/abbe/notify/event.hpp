@@ -1,0 +1,42 @@
+#pragma once
+/// A change of state that a person wants to know.
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "abbe/config/notify_config.hpp"
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::notify {
+
+using daemon::NotifyKind;
+
+enum class Severity { Info, Warning, Fault };
+
+/// Of a state that lasts: Begins, Ends. Happened: anything else.
+enum class Phase { Happened, Begins, Ends };
+
+[[nodiscard]] std::string_view name_of(Severity severity) noexcept;  ///< "info", "warning", "fault"
+[[nodiscard]] std::string_view name_of(Phase phase) noexcept;  ///< "happened", "begins", "ends"
+
+struct Event {
+  NotifyKind kind = NotifyKind::NotReachable;
+  Phase phase = Phase::Happened;
+  Severity severity = Severity::Info;
+  std::string subject{};      ///< what it is about: a device, "model", "calibration 3"
+  std::string text{};         ///< as status and page show it
+  std::string model_id{};     ///< empty: no model is meant
+  std::uint64_t session = 0;  ///< number of the calibration; 0: none
+  bool simulated = false;     ///< the devices are simulated
+  protocol::UtcTime time{};   ///< when it was seen
+};
+
+/// The present time, read by the caller.
+struct Moment {
+  std::chrono::steady_clock::time_point steady;
+  protocol::UtcTime utc;
+};
+
+}  // namespace abbe::notify

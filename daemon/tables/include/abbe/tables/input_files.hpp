@@ -103,8 +103,9 @@ struct PointsFile {
 struct VerificationFile {
   InputFile source;
   std::vector<calib::verify::MeasuredPoint> points;
-  std::vector<std::size_t> lines;  ///< line of each point; empty if not read from a file
-  std::size_t repeated = 0;        ///< rows left out because they repeat another row
+  std::vector<std::size_t> lines;       ///< line of each point; empty if not read from a file
+  std::size_t repeated = 0;             ///< rows left out because they repeat another row
+  std::optional<InputFile> readings{};  ///< of points that another program exported
 };
 [[nodiscard]] Result<VerificationFile> read_verification_csv(const std::filesystem::path& file);
 [[nodiscard]] std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points);

@@ -1,0 +1,63 @@
+#pragma once
+/// Points that another program exported as text: SpatialAnalyzer (ASCII), PolyWorks, and other
+/// lists of names and coordinates. docs/files.md states the formats, and from where they are known.
+/// Faults as in input_files.hpp.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/tables/input_files.hpp"
+
+namespace abbe::daemon {
+
+struct ExportedPoint {
+  std::string group;  ///< collection and group, as in the file; may be empty
+  std::string name;   ///< may be empty
+  calib::Vector3 p_m = calib::Vector3::Zero();
+  std::optional<double> time_s{};
+  std::size_t line = 0;
+};
+
+struct PointExport {
+  InputFile source;
+  std::string frame;  ///< as the file names it; may be empty
+  std::vector<ExportedPoint> points;
+};
+
+/// What comments of SpatialAnalyzer, or a heading, at the beginning of a file state; may be empty.
+struct PointExportHeader {
+  std::string frame, unit;  ///< unit: as an option names it; empty if it is not known
+};
+[[nodiscard]] PointExportHeader point_export_header(std::string_view text);
+
+/// True for a text with the comments of SpatialAnalyzer, with a heading that names X, Y and Z, or
+/// with a name before three numbers. A list of numbers alone is not recognised.
+[[nodiscard]] bool is_point_export(std::string_view text);
+
+/// `unit`: a word of metres_per(); must be that of the file if that states one. A fault: columns
+/// that are not known, coordinates that are not Cartesian, a point that occurs twice in a group.
+[[nodiscard]] Result<PointExport> parse_point_export(std::string_view text,
+                                                     const std::filesystem::path& file,
+                                                     std::string_view unit);
+
+/// The points as those of tracker.csv with columns x_mm, y_mm, z_mm: place_tracker() places them.
+/// Times: those of the file, or one every 1 / `points_per_s`. A fault: no times, times that do not
+/// ascend, with `points_per_s` a step of three times its neighbours and of more than 0.2 mm
+/// (missing points).
+[[nodiscard]] Result<TrackerFile> tracker_of_export(const PointExport& points,
+                                                    const std::filesystem::path& file,
+                                                    std::optional<double> points_per_s);
+
+/// The points with the scale readings at which they were measured: rows of `readings_file` with
+/// `name,x_mm,y_mm,z_mm`, or with `x_mm,y_mm,z_mm` in the order of the points. Points of different
+/// groups may have the same name: shots of one place. A fault: a point without reading, a name that
+/// is not in the export or occurs twice.
+[[nodiscard]] Result<VerificationFile> verification_of_export(
+    const PointExport& points, const std::filesystem::path& file,
+    const std::filesystem::path& readings_file);
+
+}  // namespace abbe::daemon

@@ -137,6 +137,30 @@ int run(const IdentifyOtfCommand& arguments) {
   return exit_code(outcome->verdict);
 }
 
+/// What files of other programs do not state.
+void add_foreign_options(CLI::App& command, IdentifyOtfArguments& arguments, CLI::Option* encoder) {
+  command
+      .add_option("--tracker-unit", arguments.tracker_unit,
+                  "of exported points: unit of their coordinates, if the file does not state it")
+      ->check(CLI::IsMember({"mm", "m", "inch"}));
+  command
+      .add_option("--tracker-points-per-s", arguments.tracker_points_per_s,
+                  "of exported points without times, or with times of whole seconds: they were "
+                  "measured at\nthis rate, and none is missing")
+      ->check(CLI::Range(0.1, 1e6));
+  command
+      .add_option("--encoder-pv", arguments.encoder_pvs,
+                  "of a log of camonitor, three times: X=NAME, Y=NAME, Z=NAME, the process "
+                  "variables of the\nscale readings")
+      ->allow_extra_args(false)
+      ->needs(encoder);
+  command
+      .add_option("--encoder-unit", arguments.encoder_unit,
+                  "of a log of camonitor: unit of the values")
+      ->check(CLI::IsMember({"um", "mm", "m", "inch"}))
+      ->needs(encoder);
+}
+
 }  // namespace
 
 void add_identify_otf(CLI::App& parent, int& exit) {
@@ -158,6 +182,8 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "or time_s,tracker_x_mm,tracker_y_mm,tracker_z_mm[,status], in the frame of "
       "the tracker,\n"
       "or time_s,x_mm,y_mm,z_mm[,status] in another frame, with "
+      "--tracker-centre-mm;\n"
+      "or points that SpatialAnalyzer or PolyWorks exported as text, with --tracker-unit and\n"
       "--tracker-centre-mm");
   auto* centre = command->add_option(
       "--tracker-centre-mm", arguments->tracker_centres,
@@ -171,12 +197,15 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "machine's clock; compared with the vertices of the path, to [gate] path_tolerance_mm where\n"
       "the machine stands still. On the fly they add the component along the path: offset and "
       "drift\nof the clocks are estimated. Readings of another drive, or with useless times, are "
-      "not used\nfor it, and the verdict states why");
+      "not used\nfor it, and the verdict states why. Or a log of EPICS camonitor, with "
+      "--encoder-pv "
+      "and\n--encoder-unit");
   auto* u_time = command->add_option(
       "--encoder-u-time-us", arguments->encoder_u_time_us,
       "standard uncertainty of the time of one reading, us; larger residuals give the readings "
       "less\nweight; a trigger line needs about 10 or less");
   u_time->needs(encoder)->check(CLI::Range(0.001, 1e6))->capture_default_str();
+  add_foreign_options(*command, *arguments, encoder);
   auto* recording = command->add_option(
       "--recording", arguments->recording,
       "instead of path and tracker, a recording of the daemon (.mcap): its last complete run,\n"

@@ -222,6 +222,25 @@ void print_measured_text(const MeasuredComparison& found) {
   print_volume(found.volume);
 }
 
+/// What an .rtl file does not state.
+void add_rtl_options(CLI::App& command, MeasuredOptions& options, CLI::Option* measured) {
+  command
+      .add_option("--measured-error", options.error,
+                  "of an .rtl file: EXX, EYY or EZZ, the axis that was measured")
+      ->check(CLI::IsMember({"EXX", "EYY", "EZZ"}))
+      ->needs(measured);
+  command
+      .add_option("--measured-line-mm", options.line,
+                  "of an .rtl file: X,Y,Z, positions of the axes during the measurement; that of "
+                  "the moving\naxis has no effect; the reflector at the tool offset of the model")
+      ->needs(measured);
+  command
+      .add_option("--measured-unit", options.unit,
+                  "of an .rtl file: unit of its deviations (targets are in mm)")
+      ->check(CLI::IsMember({"um", "mm"}))
+      ->needs(measured);
+}
+
 }  // namespace
 
 CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
@@ -230,7 +249,9 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
       "measured.csv: error motions that a device measured directly; compare A with them, table by\n"
       "table and in the volume. Exit code 0: at least one table agrees and none contradicts;\n"
       "5: one contradicts; 1: none could be tested, or a single value does not fit the others.\n"
-      "`abbe example measured.csv` shows the columns");
+      "`abbe example measured.csv` shows the columns. Or an .rtl file of a Renishaw laser\n"
+      "interferometer, with --measured-error, --measured-line-mm and --measured-unit");
+  add_rtl_options(command, options, measured);
   command
       .add_option("--straightness", options.straightness,
                   "line that is removed from straightness errors, of both")

@@ -249,6 +249,20 @@ int run(const VerifyCommand& arguments) {
   return number(failed ? ExitCode::Refused : ExitCode::Done);
 }
 
+/// Of points that another program exported.
+void add_export_options(CLI::App& command, VerifyCommand& arguments, CLI::Option* points) {
+  command
+      .add_option("--readings", arguments.readings,
+                  "of exported points: name,x_mm,y_mm,z_mm, the scale readings of each point; "
+                  "without name\nin the order of the points")
+      ->needs(points);
+  command
+      .add_option("--points-unit", arguments.points_unit,
+                  "of exported points: unit of their coordinates, if the file does not state it")
+      ->check(CLI::IsMember({"mm", "m", "inch"}))
+      ->needs(points);
+}
+
 void add_options(CLI::App& command, VerifyCommand& arguments) {
   command
       .add_option("MODEL", arguments.models,
@@ -261,7 +275,9 @@ void add_options(CLI::App& command, VerifyCommand& arguments) {
       "verification.csv: x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm: scale reading and\n"
       "independent measurement of each point, each in its own frame; rows with the same reading\n"
       "(to 1 mm) are shots of one place; with [[thermal]] the readings must be corrected for the\n"
-      "temperature of the scales");
+      "temperature of the scales. Or points that SpatialAnalyzer or PolyWorks exported as text, "
+      "with\n--readings, --points-unit and --frame");
+  add_export_options(command, arguments, points);
   auto* recording =
       command.add_option("--recording", arguments.recording,
                          "recording of the daemon (.mcap): one point per machine standstill");
@@ -278,11 +294,15 @@ void add_options(CLI::App& command, VerifyCommand& arguments) {
   points->excludes(recording)->excludes(live);
   recording->excludes(live);
   command
-      .add_option(
-          "--frame", arguments.frame,
+      .add_option_function<std::string>(
+          "--frame",
+          [&arguments](const std::string& frame) {
+            arguments.frame = frame;
+            arguments.frame_stated = true;
+          },
           "fit: fit the tracker's frame to the readings; machine: its axes are the machine's axes")
       ->check(CLI::IsMember({"fit", "machine"}))
-      ->capture_default_str();
+      ->default_str(arguments.frame);
   command.add_option("--tool-mm", arguments.tool,
                      "x,y,z: tool offset in mm; default: that of the calibration");
   command.add_option(

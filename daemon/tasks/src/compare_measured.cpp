@@ -8,6 +8,7 @@
 #include "abbe/calib/direct/readings_off.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/result/try.hpp"
+#include "measured_input.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -42,7 +43,7 @@ std::vector<std::string> lines_of_rows_off(const std::string& name, const Measur
 
 Result<MeasuredComparison> compare_measured(const calib::VolumetricModel& model,
                                             const MeasuredOptions& options) {
-  auto file = read_measured_csv(options.file);
+  auto file = read_measured(options);
   ABBE_TRY(file);
   const auto wanted = compare_options(options);
   auto tables = direct::compare(file->errors, model, wanted);

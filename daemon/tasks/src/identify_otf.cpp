@@ -23,6 +23,7 @@
 #include "abbe/tasks/scales_corrected.hpp"
 #include "abbe/tasks/vector_option.hpp"
 #include "argument_checks.hpp"
+#include "otf_input_files.hpp"
 #include "otf_run.hpp"
 
 namespace abbe::daemon {
@@ -130,8 +131,9 @@ Result<void> check_no_means(const IdentifyOtfArguments& arguments, const Tracker
 Result<Files> read_files(const IdentifyOtfArguments& arguments, const Progress& progress) {
   auto read = read_machine_and_path(arguments);
   ABBE_TRY(read);
-  auto tracker = read_tracker_csv(
-      arguments.tracker, [&](double fraction) { progress.show("reading the tracker", fraction); });
+  auto tracker = read_tracker_points(arguments, arguments.tracker, 0, [&](double fraction) {
+    progress.show("reading the tracker", fraction);
+  });
   ABBE_TRY(tracker);
   ABBE_TRY(check_no_means(arguments, *tracker, *read));
   const auto machine = otf_machine(read->config.machine);
@@ -144,8 +146,8 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, const Progress& 
   files.sources.push_back(files.tracker.source);
   if (arguments.encoder.empty()) return files;
 
-  auto encoder = read_encoder_csv(
-      arguments.encoder, [&](double fraction) { progress.show("reading the scales", fraction); });
+  auto encoder = read_scale_readings(
+      arguments, [&](double fraction) { progress.show("reading the scales", fraction); });
   ABBE_TRY(encoder);
   ABBE_TRY(check_time_unit(arguments.encoder, *encoder, files.path));
   files.sources.push_back(encoder->source);
@@ -232,13 +234,16 @@ Result<void> check_sources(const IdentifyOtfArguments& arguments) {
                 "identify otf needs --machine, --path and --tracker (or several --target-mm), or "
                 "--recording");
   if (!arguments.recording.empty())
-    return require_none("--recording", {{"--path", !arguments.path.empty()},
-                                        {"--tracker", !arguments.tracker.empty()},
-                                        {"--target-mm", !arguments.targets.empty()},
-                                        {"--encoder", !arguments.encoder.empty()},
-                                        {"--mode", !arguments.mode.empty()},
-                                        {"--u-scale-ppm", arguments.u_scale_ppm.has_value()},
-                                        {"--scales-corrected", arguments.scales_corrected}});
+    return require_none("--recording",
+                        {{"--path", !arguments.path.empty()},
+                         {"--tracker", !arguments.tracker.empty()},
+                         {"--target-mm", !arguments.targets.empty()},
+                         {"--encoder", !arguments.encoder.empty()},
+                         {"--mode", !arguments.mode.empty()},
+                         {"--u-scale-ppm", arguments.u_scale_ppm.has_value()},
+                         {"--tracker-unit", !arguments.tracker_unit.empty()},
+                         {"--tracker-points-per-s", arguments.tracker_points_per_s.has_value()},
+                         {"--scales-corrected", arguments.scales_corrected}});
   ABBE_TRY(require_all("identify otf", {{"--machine", !arguments.machine.empty()},
                                         {"--path", !arguments.path.empty()}}));
   if (arguments.targets.empty()) return {};

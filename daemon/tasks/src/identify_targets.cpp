@@ -15,6 +15,7 @@
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/identified_model.hpp"
 #include "abbe/tasks/scales_corrected.hpp"
+#include "otf_input_files.hpp"
 #include "otf_run.hpp"
 
 namespace abbe::daemon {
@@ -66,9 +67,10 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, const Progre
   for (const auto& text : arguments.targets) {
     const auto target = parse_target(text);
     ABBE_TRY(target);
-    auto tracker = read_tracker_csv(target->second, [&](double fraction) {
-      progress.show(fmt::format("reading {}", target->second), fraction);
-    });
+    auto tracker =
+        read_tracker_points(arguments, target->second, all.runs.size(), [&](double fraction) {
+          progress.show(fmt::format("reading {}", target->second), fraction);
+        });
     ABBE_TRY(tracker);
     ABBE_TRY(check_length_unit(target->second, *tracker, all.path, machine->nodes));
     ABBE_TRY(check_time_unit(target->second, *tracker, all.path));

@@ -13,6 +13,7 @@
 #include "abbe/replay/replay.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tasks/opened_recording.hpp"
+#include "verification_input.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -74,7 +75,7 @@ Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMac
   };
   if (!arguments.points.empty()) {
     ABBE_TRY(accept({}));
-    return from_file(read_verification_csv(arguments.points));
+    return from_file(read_verification(arguments));
   }
 
   const auto keep_them = [&arguments](const VerificationFile& points) {
@@ -122,6 +123,7 @@ Result<LivePoints> points_for(Verification& v, const VerifyArguments& arguments,
   auto points = points_of(arguments, std::move(machines), v.different_machines, progress);
   ABBE_TRY(points);
   if (!points->file.source.name.empty()) v.inputs = {points->file.source};
+  if (points->file.readings) v.inputs.push_back(*points->file.readings);
   v.lines = points->file.lines;
   v.repeated = points->file.repeated;
   if (points->cut_short) v.cut_short = points->cut_short->text;

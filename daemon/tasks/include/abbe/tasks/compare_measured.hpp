@@ -12,9 +12,10 @@
 namespace abbe::daemon {
 
 struct MeasuredOptions {
-  std::string file;  ///< measured.csv; empty: not wanted
+  std::string file;  ///< measured.csv or .rtl; empty: not wanted
   std::string straightness = "end-points";
   double u_um = 0.0, u_urad = 0.0, u_ppm = 0.0;  ///< of the device, k = 1
+  std::string error{}, line{}, unit{};           ///< what an .rtl file does not state
 };
 
 struct MeasuredComparison {

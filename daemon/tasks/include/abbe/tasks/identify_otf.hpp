@@ -33,6 +33,10 @@ struct IdentifyOtfArguments {
   /// The tracker in the frame of points x_mm, y_mm, z_mm: of all files, or one per target.
   std::vector<calib::Vector3> tracker_centres_m{};
   std::string centre_option = "--tracker-centre-mm X,Y,Z";
+  /// What files of other programs do not state: points that were exported, a log of camonitor.
+  std::string tracker_unit{}, encoder_unit{};
+  std::optional<double> tracker_points_per_s{};
+  std::vector<std::string> encoder_pvs{};  // X=NAME, Y=NAME, Z=NAME
   /// Of the file of a target; of one run: 0.
   [[nodiscard]] std::optional<calib::Vector3> tracker_centre_m(std::size_t file) const {
     if (tracker_centres_m.empty()) return std::nullopt;

@@ -40,6 +40,10 @@ struct VerifyArguments {
   std::optional<double> least_distance_mm{};
   StoreOption store{};
   bool other_machine = false;
+  /// Of points that another program exported: file of the readings, unit. Such points also need a
+  /// stated `frame`.
+  std::string readings{}, points_unit{};
+  bool frame_stated = false;
 };
 
 /// One model, or several at the same points, for example of runs at several feeds. Usage: no

@@ -101,7 +101,10 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
   std::map<std::array<double, 6>, std::size_t> lines;
 
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto [first, is_new] = lines.emplace(cells_of<6>(table, row), table.line(row));
+    std::array<double, 6> cells{};
+    for (std::size_t column = 0; column < cells.size(); ++column)
+      cells[column] = table.at(row, column);
+    const auto [first, is_new] = lines.emplace(cells, table.line(row));
     if (!is_new && table.sound(row))
       faults.add_kind(
           "repeated", table.line(row), 1, "",

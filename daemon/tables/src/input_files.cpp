@@ -8,13 +8,14 @@
 #include <limits>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/geometry/rigid_transform.hpp"
 #include "abbe/result/try.hpp"
-#include "row_cells.hpp"
+#include "repeated_points.hpp"
 
 namespace abbe::daemon {
 
@@ -290,8 +291,7 @@ Result<VerificationFile> read_verification_csv(const std::filesystem::path& file
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   const auto& table = parsed->table;
-  VerificationFile out{parsed->source, {}, {}, 0};
-  std::set<std::array<double, 6>> seen;
+  VerificationFile out{parsed->source};
 
   const auto vector_m = [&](std::size_t row, std::size_t first) {
     const auto p = position_m(table, row, first);
@@ -299,15 +299,26 @@ Result<VerificationFile> read_verification_csv(const std::filesystem::path& file
   };
 
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (!seen.insert(cells_of<6>(table, row)).second) {
-      ++out.repeated;
-      continue;
-    }
     out.points.push_back({vector_m(row, 0), vector_m(row, 3)});
     out.lines.push_back(table.line(row));
   }
 
+  leave_out_repeated(out);
   return out;
+}
+
+void leave_out_repeated(VerificationFile& file) {
+  std::set<std::array<double, 6>> seen;
+  VerificationFile kept{file.source};
+  for (std::size_t i = 0; i < file.points.size(); ++i) {
+    const auto& [q, p] = file.points[i];
+    if (!seen.insert({q.x(), q.y(), q.z(), p.x(), p.y(), p.z()}).second) continue;
+    kept.points.push_back(file.points[i]);
+    kept.lines.push_back(file.lines[i]);
+  }
+  file.repeated = file.points.size() - kept.points.size();
+  file.points = std::move(kept.points);
+  file.lines = std::move(kept.lines);
 }
 
 std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points) {

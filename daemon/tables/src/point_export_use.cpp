@@ -9,6 +9,7 @@
 #include "abbe/protocol/printable.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/point_export.hpp"
+#include "repeated_points.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -130,7 +131,7 @@ Result<VerificationFile> verification_of_export(const PointExport& points,
   ABBE_TRY(readings);
   check_rows(*readings, 1, "readings");
 
-  VerificationFile out{points.source, {}, {}};
+  VerificationFile out{points.source};
   for (const ExportedPoint& point : points.points) {
     out.points.push_back({calib::Vector3::Zero(), point.p_m});
     out.lines.push_back(point.line);
@@ -149,6 +150,7 @@ Result<VerificationFile> verification_of_export(const PointExport& points,
     take_in_order(*readings, points, out);
   if (readings->faults.any()) return tl::make_unexpected(readings->faults.to_error());
   out.readings = readings->source;
+  leave_out_repeated(out);
   return out;
 }
 

@@ -102,8 +102,8 @@ struct PointsFile {
 /// that repeats an earlier row in every digit is not another measurement: it counts once.
 struct VerificationFile {
   InputFile source;
-  std::vector<calib::verify::MeasuredPoint> points;
-  std::vector<std::size_t> lines;       ///< line of each point; empty if not read from a file
+  std::vector<calib::verify::MeasuredPoint> points{};
+  std::vector<std::size_t> lines{};     ///< line of each point; empty if not read from a file
   std::size_t repeated = 0;             ///< rows left out because they repeat another row
   std::optional<InputFile> readings{};  ///< of points that another program exported
 };

@@ -150,26 +150,42 @@ std::vector<Corrected> corrections(std::span<const MeasuredPoint> points, Frame 
   return all;
 }
 
+/// A correction, with what the corrected points leave.
+struct Fit {
+  Left left;
+  Left left_without_model;
+};
+
 struct Fits {
   std::vector<TriedCorrection> best;  ///< best first; `left` relative
   Left as_given;
-  std::vector<double> rms_m;  ///< of `best`
+  std::vector<Fit> of_best;  ///< in the order of `best`
 };
 
 Fits fits_of(std::span<const MeasuredPoint> points, Frame frame, const ErrorsAt& errors_at) {
   Fits fits{{}, left_by(points, frame, errors_at), {}};
   std::vector<TriedCorrection> tried;
-  std::map<std::string, double> rms_of;
+  std::map<std::string, Fit> fit_of;
   for (const Corrected& c : corrections(points, frame, errors_at)) {
-    const Left left = left_by(c.points, frame, errors_at);
-    tried.push_back({c.text, left.relative});
-    rms_of[c.text] = left.rms_m;
+    const Fit fit{left_by(c.points, frame, errors_at), left_by(c.points, frame, {})};
+    tried.push_back({c.text, fit.left.relative});
+    fit_of[c.text] = fit;
   }
   fits.best = far_better(fits.as_given.relative, std::move(tried));
   for (const TriedCorrection& t : fits.best) {
-    fits.rms_m.push_back(rms_of.at(t.text));
+    fits.of_best.push_back(fit_of.at(t.text));
   }
   return fits;
+}
+
+/// Whether the corrected points prove the mistake: either they fit a rigid motion far better, or
+/// the model explains most of the errors of six or more points. The model of a machine that has
+/// changed explains neither; one of the many corrections may then fit by chance.
+bool is_proven(const Fit& fit, const Left& given_without_model, std::size_t points) {
+  constexpr std::size_t kFewestToExplain = 6;
+  const double rigid = fit.left_without_model.relative;
+  return rigid <= kFarBetter * given_without_model.relative ||
+         (points >= kFewestToExplain && fit.left.relative <= kFarBetter * rigid);
 }
 
 /// In um, with three decimals.
@@ -217,12 +233,17 @@ std::string mistakes_that_fit(std::span<const MeasuredPoint> points, Frame frame
 std::vector<std::string> likely_mistakes(std::span<const MeasuredPoint> points, Frame frame,
                                          const ErrorsAt& errors_at) {
   const Fits fits = fits_of(points, frame, errors_at);
+  const Left given_without_model = left_by(points, frame, {});
   std::vector<std::string> texts;
   for (std::size_t i = 0; i < fits.best.size(); ++i) {
+    if (!is_proven(fits.of_best[i], given_without_model, points.size())) {
+      continue;
+    }
     const std::string given = std::isfinite(fits.as_given.rms_m)
                                   ? message(", ", um(fits.as_given.rms_m), " um as given")
                                   : std::string();
-    texts.push_back(message(fits.best[i].text, ": ", um(fits.rms_m[i]), " um rms left", given));
+    texts.push_back(
+        message(fits.best[i].text, ": ", um(fits.of_best[i].left.rms_m), " um rms left", given));
   }
   return texts;
 }

@@ -86,35 +86,77 @@ class RmsAlongPath {
   std::array<double, kIntervals> before_{}, after_{}, counts_{};
 };
 
+/// The rows behind a vertex of the path, up to the row before the current one. Not every row is
+/// compared with each new line, because a leg has thousands of rows: their distances from the line
+/// change by less than the turn of the line times their distance from the vertex.
+class SkippedRows {
+ public:
+  [[nodiscard]] bool empty() const { return rows_m_.empty(); }
+  [[nodiscard]] const calib::Vector3& last() const { return rows_m_.back(); }
+
+  void restart_at(const calib::Vector3& vertex_m) {
+    vertex_m_ = vertex_m;
+    rows_m_.clear();
+    compared_ = calib::Vector3::Zero();
+    aside_m_ = reach_m_ = 0.0;
+  }
+  calib::Vector3 restart_at_last() {
+    const calib::Vector3 vertex_m = last();
+    restart_at(vertex_m);
+    return vertex_m;
+  }
+
+  /// Whether a row is farther than kStraight_m from the line from the vertex through `q_m`.
+  [[nodiscard]] bool one_lies_aside(const calib::Vector3& q_m) {
+    const calib::Vector3 chord_m = q_m - vertex_m_;
+    const double length_m = chord_m.norm();
+    if (rows_m_.empty() || length_m == 0.0) return false;
+    const calib::Vector3 direction = chord_m / length_m;
+    if (aside_m_ + reach_m_ * (direction - compared_).norm() <= kStraight_m) return false;
+
+    compared_ = direction;
+    aside_m_ = 0.0;
+    for (const calib::Vector3& p_m : rows_m_)
+      aside_m_ = std::max(aside_m_, (p_m - vertex_m_).cross(direction).norm());
+    return aside_m_ > kStraight_m;
+  }
+
+  void add(const calib::Vector3& q_m) {
+    const calib::Vector3 from_m = q_m - vertex_m_;
+    rows_m_.push_back(q_m);
+    reach_m_ = std::max(reach_m_, from_m.norm());
+    aside_m_ =
+        std::max(aside_m_, compared_.isZero() ? from_m.norm() : from_m.cross(compared_).norm());
+  }
+
+ private:
+  static constexpr double kStraight_m = 0.5e-3;
+  calib::Vector3 vertex_m_ = calib::Vector3::Zero();
+  std::vector<calib::Vector3> rows_m_;
+  calib::Vector3 compared_ = calib::Vector3::Zero();  ///< direction of the line; zero: none yet
+  double aside_m_ = 0.0;                              ///< largest distance of a row from that line
+  double reach_m_ = 0.0;                              ///< largest distance of a row from the vertex
+};
+
 /// The driven path: its rows in order, without those that lie on the straight line between others.
 std::vector<calib::Vector3> driven_path(const RunResiduals& run) {
-  constexpr double kStraight_m = 0.5e-3;
   std::vector<const calib::otf::PlacedResidual*> rows;
   for (const auto& row : run) rows.push_back(&row);
   std::ranges::stable_sort(rows, {}, &calib::otf::PlacedResidual::way_m);
 
   std::vector<calib::Vector3> path;
-  std::vector<calib::Vector3> skipped;  // between the last vertex and the row before this one
+  SkippedRows skipped;
   for (const auto* row : rows) {
     const calib::Vector3& q_m = row->axis_position_m;
-    if (!path.empty() && !skipped.empty()) {
-      const calib::Vector3 chord_m = q_m - path.back();
-      const auto aside = [&](const calib::Vector3& p_m) {
-        const calib::Vector3 from_m = p_m - path.back();
-        return from_m.cross(chord_m).norm() > kStraight_m * chord_m.norm();
-      };
-      if (std::ranges::any_of(skipped, aside)) {
-        path.push_back(skipped.back());
-        skipped.clear();
-      }
-    }
     if (path.empty()) {
       path.push_back(q_m);
-    } else {
-      skipped.push_back(q_m);
+      skipped.restart_at(q_m);
+      continue;
     }
+    if (skipped.one_lies_aside(q_m)) path.push_back(skipped.restart_at_last());
+    skipped.add(q_m);
   }
-  if (!skipped.empty()) path.push_back(skipped.back());
+  if (!skipped.empty()) path.push_back(skipped.last());
   return path;
 }
 

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <sstream>
 #include <string>
 
 namespace abbe::daemon::test {
@@ -10,7 +10,9 @@ namespace abbe::daemon::test {
 /// Empty for a file that is not there.
 [[nodiscard]] inline std::string text_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>{in}, {}};
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
 }
 
 inline void write_text(const std::filesystem::path& file, const std::string& text) {

@@ -21,8 +21,9 @@ namespace abbe::daemon {
 using FileBytes = std::vector<char>;
 
 inline FileBytes bytes_of_file(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  FileBytes bytes(std::filesystem::file_size(file));
+  std::ifstream(file, std::ios::binary).read(bytes.data(), std::ssize(bytes));
+  return bytes;
 }
 
 inline void write_file(const std::filesystem::path& file, const FileBytes& bytes,

@@ -5,7 +5,7 @@
 
 namespace abbe::daemon {
 
-/// X, Y and Z in m; scale readings unless the name of the variable states otherwise.
+/// X, Y and Z in m. The values are scale readings unless the name of a variable states otherwise.
 using AxisPosition = std::array<double, 3>;
 
 }  // namespace abbe::daemon

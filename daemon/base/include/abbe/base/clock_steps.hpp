@@ -1,7 +1,8 @@
 #pragma once
-/// Detects that the wall clock was set while a process ran, for example by a time server after the
-/// battery of the real-time clock failed, and that the computer was suspended. Dates before and
-/// after then do not fit together. Not for real-time threads.
+/// Detects that the wall clock was set, or that the computer was suspended, while a process ran. A
+/// time server may set the clock, for example after the battery of the real-time clock failed.
+/// Dates that were read before and after such a step do not fit together. Not for real-time
+/// threads.
 
 #include <chrono>
 #include <string>
@@ -25,12 +26,13 @@ struct ClockChange {
 };
 [[nodiscard]] ClockChange change_between(const ClockReading& start, const ClockReading& now);
 
-/// Smaller changes are not reported: a leap second, a correction by a time server, and the time
-/// between the readings of two clocks are no reason to doubt a date.
+/// Changes smaller than this are not reported. They may come from a leap second, from a correction
+/// by a time server, or from the time between reading the two clocks.
 inline constexpr std::chrono::seconds kLeastClockChange{2};
 
-/// Sentences without full stop: "the wall clock was set forward by 200 d 3 h". `since`: "abbed
-/// started". Empty: nothing happened.
+/// The change as sentences without full stop, for example "the wall clock was set forward by 200 d
+/// 3 h". `since` is the start of the time considered, for example "abbed started". Empty: the
+/// clocks were not changed.
 [[nodiscard]] std::vector<std::string> in_words(const ClockChange& change,
                                                 const std::string& since);
 
@@ -38,10 +40,10 @@ class ClockSteps {
  public:
   explicit ClockSteps(const ClockReading& start) : start_(start) {}
 
-  /// True if, at this call or an earlier one, the wall clock (`utc`) differed by more than five
-  /// minutes from where it would be without having been set: from its value at construction plus
-  /// the advance of `since_boot`. Stays true when the wall clock is corrected later, because files
-  /// got wrong dates in between. One thread.
+  /// Compares `utc` with its expected value: `utc` at construction plus the advance of
+  /// `since_boot`. Returns true if the difference exceeded five minutes at this call or at an
+  /// earlier one. The result stays true when the wall clock is corrected later, because files got
+  /// wrong dates in between. One thread.
   [[nodiscard]] bool look(const ClockReading& now);
 
  private:

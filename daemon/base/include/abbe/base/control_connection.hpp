@@ -1,6 +1,6 @@
 #pragma once
-/// A connection to the control socket that is kept for many requests. ask_daemon() of
-/// control_protocol.hpp connects for one. One thread.
+/// A connection to the control socket that is kept open for many requests. In contrast,
+/// ask_daemon() of control_protocol.hpp opens a connection for each request. One thread.
 
 #include <chrono>
 #include <filesystem>

@@ -40,8 +40,8 @@ struct ControlPeer {
 };
 
 /// If a new connection exceeds one of these limits, the server closes the connection that has been
-/// idle longest: among those of the new client's user if that user already has `of_one_user`, else
-/// among those of the user with the most connections.
+/// idle longest. If the new client's user already has `of_one_user` connections, one of that user
+/// is closed, else one of the user with the most connections.
 struct ControlLimits {
   std::size_t connections = 32;
   std::size_t of_one_user = 16;
@@ -50,8 +50,8 @@ struct ControlLimits {
 };
 
 /// Serves the socket on its own thread. The handler runs on that thread and must not block for
-/// long. Requests of more than 64 kB are answered on a second thread, one after the other, because
-/// they take longer to read: the handler is called by two threads.
+/// long. Requests of more than 64 kB take longer to read and are answered on a second thread, one
+/// after the other. The handler is therefore called by two threads.
 class ControlServer {
  public:
   using Handler =

@@ -1,6 +1,6 @@
 #pragma once
-/// Asks abbed for its status once a second, on a thread of its own: an abbed that hangs must not
-/// delay what the process does beside it. For abbe-mtconnect and abbe-notify.
+/// Asks abbed for its status once a second on a separate thread, so that an abbed that does not
+/// answer does not delay the other work of the process. Used by abbe-mtconnect and abbe-notify.
 
 #include <chrono>
 #include <condition_variable>
@@ -25,9 +25,10 @@ class DaemonPoll {
   DaemonPoll& operator=(const DaemonPoll&) = delete;
   ~DaemonPoll();  ///< waits for the end of a request, at most a few seconds
 
-  /// Becomes readable when take() has an answer.
+  /// This descriptor becomes readable when take() has an answer.
   [[nodiscard]] int wake_fd() const noexcept { return wake_.get(); }
-  /// The latest answer, once; an Error if abbed did not answer. Any thread.
+  /// The latest answer, returned once; nullopt if there is no new one; an Error if abbed did not
+  /// answer. Any thread.
   [[nodiscard]] std::optional<Answer> take();
 
  private:

@@ -1,27 +1,29 @@
 #pragma once
-/// How long the parts of abbed may take when it ends. Together they fit into TimeoutStopSec of
-/// abbed.service, after which systemd kills abbed; a test compares them with the unit.
+/// The longest times that the parts of abbed may take when abbed ends. Their sum fits into
+/// TimeoutStopSec of abbed.service, after which systemd kills abbed. A test compares the sum with
+/// the unit file.
 
 #include <chrono>
 
 namespace abbe::daemon {
 
-/// Control socket (3 s at most), journal and hub. Then abbed exits at once.
+/// To close the control socket (3 s at most), the journal and the hub. If this takes longer, abbed
+/// exits at once.
 inline constexpr std::chrono::seconds kLongestHubEnd{5};
-/// A running identification and models that are not stored.
+/// To end a running identification and to store models that are not stored yet.
 inline constexpr std::chrono::seconds kLongestWorkEnd{4};
-/// The last state of the counters.
+/// To write the last state of the counters.
 inline constexpr std::chrono::seconds kLongestCountingEnd{3};
-/// A measuring machine that moves: another connection, if the present one is lost, ...
+/// To connect to a moving measuring machine again, if the present connection is lost.
 inline constexpr std::chrono::seconds kLongestMachineConnect{3};
-/// ... and the answer to AbortE: the largest [cmm] command_timeout_s.
+/// To wait for the answer to AbortE: the largest allowed [cmm] command_timeout_s.
 inline constexpr std::chrono::seconds kLongestMachineAnswer{5};
-/// The state of the measuring machine in its file.
+/// To write the state of the measuring machine to its file.
 inline constexpr std::chrono::seconds kLongestHoldEnd{3};
-/// abbe-dds as a child of abbed: from SIGTERM to SIGKILL.
+/// To end abbe-dds, a child process of abbed: time from SIGTERM to SIGKILL.
 inline constexpr std::chrono::seconds kLongestDdsEnd{3};
 
-/// All of them one after the other, and the disk. Then abbed exits at once.
+/// Sum of all times above, plus time for the disk. If the end takes longer, abbed exits at once.
 inline constexpr std::chrono::seconds kLongestEnd{27};
 static_assert(kLongestHubEnd + kLongestWorkEnd + kLongestCountingEnd + kLongestMachineConnect +
                   kLongestMachineAnswer + kLongestHoldEnd + kLongestDdsEnd <

@@ -35,8 +35,8 @@ using Result = tl::expected<T, Error>;
   return tl::make_unexpected(Error{code, std::move(text)});
 }
 
-/// Exit code of a program that ends with an error of this code; never 0. Every --help lists the
-/// exit codes.
+/// Exit code of a program that ends with an error of this code; never 0. The --help text of every
+/// program lists the exit codes.
 [[nodiscard]] constexpr int exit_code(ErrorCode code) noexcept {
   switch (code) {
     case ErrorCode::DataInsufficient:

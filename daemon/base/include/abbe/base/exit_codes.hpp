@@ -1,5 +1,6 @@
 #pragma once
-/// The exit codes of all programs, defined in protocol, as names of this namespace.
+/// The exit codes of all programs. They are defined in protocol; this header makes their names
+/// known in this namespace.
 
 #include "abbe/protocol/exit_codes.hpp"
 

@@ -2,7 +2,7 @@
 /// Ends the process if its orderly shutdown hangs, for example because a thread does not return.
 /// If an ExitDeadline is not destroyed within `time_limit`, the process calls `last_act`, writes
 /// `message` and the text that `last_act` returned to stderr, and exits with `exit_code` without
-/// running destructors. A stderr that nobody reads does not delay it by more than 0.2 s.
+/// running destructors. If no process reads stderr, writing to it delays the exit by at most 0.2 s.
 
 #include <chrono>
 #include <functional>

@@ -1,5 +1,5 @@
 #pragma once
-/// The faults of an input file as an Error of the daemon.
+/// Collects the faults of an input file and converts them to an Error of the daemon.
 
 #include "abbe/base/error.hpp"
 #include "abbe/protocol/table/faults.hpp"

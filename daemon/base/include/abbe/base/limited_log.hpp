@@ -10,10 +10,10 @@
 
 namespace abbe::daemon {
 
-/// Lines for the log about clients: one that connects again and again must not fill the journal. Of
-/// each subject a number of lines in a period is written, and the number of those that were left
-/// out is added to the next one. `Write` escapes what a client may have sent, as print_message()
-/// does. Thread-safe.
+/// Writes log lines about clients. A client that connects again and again must not fill the
+/// journal; therefore a limited number of lines per subject is written in a period. The next line
+/// that is written states how many were left out. `Write` escapes characters that a client may have
+/// sent, as print_message() does. Thread-safe.
 class LimitedLog {
  public:
   using Clock = std::chrono::steady_clock;

@@ -1,7 +1,7 @@
 #pragma once
 /// Messages of the programs for people, on stderr (the journal under systemd). Texts may come from
-/// files, devices and the network: a character that is not visible is written as an escape, so that
-/// a terminal cannot take it for a command.
+/// files, devices and the network. A character that is not visible is therefore written as an
+/// escape, so that a terminal does not execute it as a control sequence.
 
 #include <string_view>
 
@@ -12,7 +12,7 @@ namespace abbe::daemon {
 /// Prints "PROGRAM: TEXT".
 void print_message(std::string_view program, std::string_view text);
 
-/// Prints the error as print_message(), and its details, one a line.
+/// Prints the error in the form of print_message(), followed by its details, one per line.
 void print_error(std::string_view program, const Error& error);
 
 }  // namespace abbe::daemon

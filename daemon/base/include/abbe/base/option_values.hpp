@@ -1,6 +1,6 @@
 #pragma once
-/// The check of all values of command line options and the units of their names, defined in
-/// protocol, as names of this namespace.
+/// The check of the values of command line options, and the units in the names of options. They are
+/// defined in protocol; this header makes their names known in this namespace.
 
 #include "abbe/protocol/option_values.hpp"
 #include "abbe/protocol/option_words.hpp"

@@ -1,6 +1,6 @@
 #pragma once
-/// Reads, hashes and parses a file of numbers. The caller then checks the values and adds what is
-/// invalid to `faults`.
+/// Reads, hashes and parses a file of numbers. The caller then checks the values and adds a fault
+/// to `faults` for each invalid value.
 
 #include <filesystem>
 #include <string_view>
@@ -27,7 +27,7 @@ struct ParsedTable {
 [[nodiscard]] Result<ParsedTable> parse_table(const std::filesystem::path& file,
                                               const std::vector<TableForm>& forms,
                                               const ReadProgress& progress = {});
-/// The same for the content of a file that another process has read.
+/// Same as the function above, for the content of a file that another process has read.
 [[nodiscard]] Result<ParsedTable> parse_table(std::string_view text,
                                               const std::filesystem::path& file,
                                               const std::vector<TableForm>& forms,

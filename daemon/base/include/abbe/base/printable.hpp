@@ -1,5 +1,6 @@
 #pragma once
-/// Text with escapes for what is not visible, defined in protocol, as names of this namespace.
+/// Replaces characters that are not visible by escapes. Defined in protocol; this header makes the
+/// names known in this namespace.
 
 #include "abbe/protocol/printable.hpp"
 

@@ -1,6 +1,7 @@
 #pragma once
 /// Files with secrets: users of the page, tokens and passwords of receivers of notifications. They
-/// belong to root or to the program's user; its group may read them, and nobody else.
+/// belong to root or to the program's user. The group of the file may read them; other users may
+/// not.
 
 #include <filesystem>
 #include <string>
@@ -9,8 +10,8 @@
 
 namespace abbe::daemon {
 
-/// Io if the file cannot be examined; BadInput, with what to do, if other users may read or change
-/// it.
+/// Checks owner and mode of the file. Io if the file cannot be examined. BadInput if other users
+/// may read or change it; the text states what to do.
 [[nodiscard]] Result<void> check_secret_mode(const std::filesystem::path& file);
 
 /// The first line of the file, without the line end. BadInput also if it is empty, longer than 4

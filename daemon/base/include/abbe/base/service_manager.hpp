@@ -1,6 +1,6 @@
 #pragma once
-/// Notifications to systemd from a service of Type=notify. Without systemd these functions do
-/// nothing.
+/// Notifications to systemd from a service of Type=notify. If systemd does not run the program,
+/// these functions do nothing.
 
 #include <chrono>
 #include <optional>

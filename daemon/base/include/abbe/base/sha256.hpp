@@ -28,7 +28,8 @@ class Sha256 {
   requires std::is_trivially_copyable_v<T>
   void update_bytes_of(const T& value) { update(std::as_bytes(std::span{&value, 1})); }
   [[nodiscard]] std::string hex();  ///< 64 lower-case digits; the hash is finished afterwards
-  [[nodiscard]] std::string hex_so_far() const;  ///< of the bytes added so far; more may follow
+  /// hash of the bytes added so far; more bytes may follow
+  [[nodiscard]] std::string hex_so_far() const;
 
  private:
   struct State;

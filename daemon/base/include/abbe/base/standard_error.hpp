@@ -1,12 +1,7 @@
 #pragma once
-/// Output to stderr that never waits for whoever reads it. A terminal that is stopped, a `tee` that
-/// hangs, a pipe that nobody reads: a write to it blocks, and would keep a program that serves
-/// something, or that must stop a machine, from running and from ending.
-///
-/// After unblock_stderr() everything that this process writes to `stderr`, std::cerr and std::clog
-/// passes through memory to a thread that writes it. What does not fit is dropped, and the number
-/// of lost messages is written later. O_NONBLOCK is not used: it would also apply to the other
-/// processes at the same terminal or pipe. Child processes inherit the original descriptor.
+/// Output to stderr that never waits for the reader. A write to a stopped terminal, to a `tee` that
+/// hangs or to a pipe that no process reads would block. A program that serves clients or must stop
+/// a machine could then neither run nor end.
 
 #include <chrono>
 #include <cstddef>
@@ -15,7 +10,7 @@
 
 namespace abbe::daemon {
 
-/// Bytes of messages that wait to be written.
+/// Most bytes of messages that wait to be written.
 inline constexpr std::size_t kMostWaitingStderr = std::size_t{256} * 1024;
 
 /// Call it once, in main(), before other threads are started. `program`: the name in the message
@@ -23,13 +18,13 @@ inline constexpr std::size_t kMostWaitingStderr = std::size_t{256} * 1024;
 /// process. At the end of main(), or in exit(), drain_stderr() is called.
 void unblock_stderr(std::string program);
 
-/// Waits until the messages written before are out, at most `at_most`. Call it before _exit() and
-/// exec(). Returns at once without unblock_stderr().
+/// Waits until the messages written so far are out, at most `at_most`. Call it before _exit() and
+/// exec(). Without an earlier unblock_stderr() it returns at once.
 void drain_stderr(std::chrono::milliseconds at_most = std::chrono::milliseconds{500});
 
-/// Writes to a descriptor, but waits at most `at_most` in total for space. For a process that ends:
-/// async-signal-safe, takes no lock, and does not use the thread of unblock_stderr(). False: not
-/// everything was written.
+/// Writes to a descriptor and waits at most `at_most` in total for space. Meant for a process that
+/// ends: it is async-signal-safe, takes no lock, and does not use the thread of unblock_stderr().
+/// Returns false if not everything was written.
 bool write_within(int fd, std::string_view text, std::chrono::milliseconds at_most) noexcept;
 
 }  // namespace abbe::daemon

@@ -9,8 +9,8 @@
 
 namespace abbe::daemon {
 
-/// The bytes of a file. Reads, does not map: a mapped file that shrinks kills the process with
-/// SIGBUS.
+/// The bytes of a file. The file is read, not mapped into memory: if a mapped file shrinks, the
+/// process is killed by SIGBUS.
 [[nodiscard]] Result<std::string> read_text(const std::filesystem::path& file);
 
 /// As read_text(), but the file must be a regular file of at most 1 GiB. A pipe or a device is
@@ -23,11 +23,11 @@ namespace abbe::daemon {
 /// can read what root writes there.
 [[nodiscard]] Result<void> replace_file(const std::filesystem::path& file, std::string_view text);
 
-/// Removes the temporary files of replace_file(file, ...) of runs that were killed while writing.
+/// Removes the temporary files that killed processes left behind in replace_file(file, ...).
 void remove_half_written(const std::filesystem::path& file);
 
 /// Owner and mode of a folder that root creates. LikeItsParent: those of the parent folder, so that
-/// the owner of the parent can use the new folder. OfTheCaller: owner and umask of the process.
+/// the owner of the parent can use the new folder. OfTheCaller: owner and umask of this process.
 enum class NewFolder { LikeItsParent, OfTheCaller };
 
 /// Creates `folder` and its missing parents.

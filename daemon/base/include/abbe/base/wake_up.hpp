@@ -28,7 +28,7 @@ class WakeUp {
     }
     order_memory();
   }
-  /// True if a signal came within `at_most`.
+  /// True if a signal came within `at_most`; one signal is then consumed.
   bool wait_for(std::chrono::nanoseconds at_most) noexcept {
     const auto until = (std::chrono::steady_clock::now() + at_most).time_since_epoch();
     const auto seconds = std::chrono::floor<std::chrono::seconds>(until);
@@ -42,7 +42,7 @@ class WakeUp {
   }
 
  private:
-  /// Acquire: pairs with the release in signal(). The semaphore orders memory as well, but
+  /// The acquire load pairs with the release in signal(). The semaphore orders memory as well, but
   /// ThreadSanitizer of GCC 12 does not support sem_clockwait.
   void order_memory() const noexcept { (void)signals_.load(std::memory_order_acquire); }
 

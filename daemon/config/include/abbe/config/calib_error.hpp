@@ -1,5 +1,5 @@
 #pragma once
-/// Errors of the module calib. Pure.
+/// Conversion of errors of the module calib. Pure.
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/base/error.hpp"

@@ -1,7 +1,7 @@
 #pragma once
-/// What the configured devices provide, independent of their kinds (tracker, encoder, ...). Other
-/// modules use these functions; only the source files of a kind read the configuration table of
-/// that kind. Pure.
+/// The functions of the configured devices (reads axes, delivers touches, moves ...), independent
+/// of the kind of device (tracker, encoder, ...). Other modules use this header; only the source
+/// files of a kind read the configuration table of that kind. Pure.
 
 #include <chrono>
 #include <optional>
@@ -28,13 +28,13 @@ struct TrackerSource {
     LastSet,
   };
 
-  std::string_view key;  ///< of its table
-  std::string device;    ///< its name
+  std::string_view key;  ///< key of the device's configuration table
+  std::string device;    ///< name of the device
   double point_rate_hz = 0.0;
   /// Duration of a measurement of a stationary reflector; the device then delivers one mean value
   /// for each. nullopt: the device delivers points during motion.
   std::optional<std::chrono::nanoseconds> stationary_time = std::nullopt;
-  double u_scale = 0.0;  ///< relative standard uncertainty common to all distances
+  double u_scale = 0.0;  ///< relative standard uncertainty common to all distances of the tracker
   Air air = Air::Measured;
   /// the configuration key that selects `air`, as text for messages
   std::string air_setting = {};
@@ -43,10 +43,10 @@ struct TrackerSource {
 
 /// The device that delivers touches.
 struct TouchSource {
-  std::string_view key;  ///< of its table
-  std::string device;    ///< its name
-  /// True: the device reports the position of each touch. False: a touch has the readings of the
-  /// axes.
+  std::string_view key;  ///< key of the device's configuration table
+  std::string device;    ///< name of the device
+  /// True: the device reports the position of each touch. False: a touch contains the readings of
+  /// the axes.
   bool reports_positions = false;
   bool compensated = false;  ///< the device corrects the positions that it reports
 };
@@ -54,17 +54,17 @@ struct TouchSource {
 
 /// The device that moves and touches points under its own control.
 struct MotionSource {
-  std::string_view key;             ///< of its table
-  std::string device;               ///< its name
-  std::optional<MotionBox> volume;  ///< nullopt: its table sets none
+  std::string_view key;             ///< key of the device's configuration table
+  std::string device;               ///< name of the device
+  std::optional<MotionBox> volume;  ///< volume in which it may move; nullopt: its table sets none
 };
 [[nodiscard]] std::optional<MotionSource> motion_source(const Config& config);
 
 /// The card whose counters read the axes. When the card is set up its counters start at 0, so the
 /// axis readings have an unknown offset until the axes are referenced; see AxisZeros.
 struct CountedAxes {
-  std::string_view key;       ///< of its table
-  const UsbCardConfig& card;  ///< in the Config
+  std::string_view key;       ///< key of the card's configuration table
+  const UsbCardConfig& card;  ///< refers into the Config
   /// True: an axis without reference marks has its configured offset as reading when the card is
   /// set up for the first time. False: such an axis is not referenced then.
   bool zero_is_here = false;
@@ -82,9 +82,9 @@ struct CountedAxes {
 
 /// A device that measures quantities of the environment in rounds.
 struct EnvironmentSource {
-  std::string device;  ///< its name
+  std::string device;  ///< name of the device
   protocol::EnvironmentMask measured = 0;
-  std::chrono::nanoseconds period{};  ///< of the rounds
+  std::chrono::nanoseconds period{};  ///< time between two rounds
 };
 [[nodiscard]] std::vector<EnvironmentSource> environment_sources(const Config& config);
 

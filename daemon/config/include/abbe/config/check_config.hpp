@@ -15,16 +15,18 @@ namespace abbe::daemon {
 
 struct CheckedConfig {
   Config config;
-  /// One for each value that is possible but probably wrong, "file:line:column: key: what": a value
-  /// in another unit, a forgotten table, or the number of a CPU that this computer does not have.
+  /// Values that are possible but probably wrong, one text for each, "file:line:column: key: what".
+  /// Examples are a value in another unit, a forgotten table, or the number of a CPU that this
+  /// computer does not have.
   std::vector<std::string> warnings;
-  /// The values of name, travel, target and host that are still those of the example file,
-  /// "machine.name \"mill 7\""; empty if fewer than two are.
+  /// Settings of name, travel, target and host that still have the value of the example file,
+  /// "machine.name \"mill 7\"". Empty if fewer than two are left.
   std::vector<std::string> of_the_example;
 };
 
-/// As load_config(). Further faults are the path of a folder that cannot be created, a missing DDS
-/// profile and a missing folder of DDS keys. `cpus`: number of CPUs of this computer.
+/// Loads the file as load_config() does. Further faults are the path of a folder that cannot be
+/// created, a missing DDS profile and a missing folder of DDS keys. `cpus`: number of CPUs of this
+/// computer.
 [[nodiscard]] Result<CheckedConfig> check_config(const std::filesystem::path& file, int cpus);
 
 /// Describes the configuration, one line per fact, without line ends: machine, axes with travel and

@@ -41,7 +41,7 @@ struct AxisConfig {
 /// Direction of a machine axis along which the vertical axis of a levelled tracker points.
 enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
 
-/// Of error tables between their nodes.
+/// Interpolation of the error tables between their nodes.
 enum class TableInterpolation { Linear, NaturalCubic, NotAKnotCubic };
 
 /// [machine], [axes.*], [target], [model], and the noise of the tracker: the input of an
@@ -52,11 +52,12 @@ struct MachineConfig {
   std::vector<AxisConfig> axes;  ///< X, Y, Z, then other linear, then rotary axes by name
   /// Reflector centre relative to the tool reference point, along the machine axes.
   std::array<double, 3> target_offset_m{};
-  /// [target] offset_mm is present. If false, target_offset_m is not valid; see require_target().
+  /// True if the file contains [target] offset_mm. If false, target_offset_m is not valid; see
+  /// require_target().
   bool target_given = false;
   /// Nodes of every linear axis, ascending, from one end of travel to the other.
   std::map<std::string, std::vector<double>> nodes_m;
-  /// [model] basis, of the tables that on-the-fly calibration identifies.
+  /// Key [model] basis: interpolation of the tables that on-the-fly calibration identifies.
   TableInterpolation interpolation = TableInterpolation::Linear;
   double sigma_range_m = 2e-6;  ///< standard deviation of one tracker range
   /// Standard deviation of one tracker direction, perpendicular to the beam.
@@ -64,11 +65,12 @@ struct MachineConfig {
   /// Standard uncertainty of the offset common to all ranges. From a limit of error of 10 um for
   /// home position and reflector: 10 um / sqrt(3).
   double u_range_offset_m = 6e-6;
-  /// Where the tracker stands. Runs with the same name have the same offset of the ranges: same
-  /// home position and reflector. Empty: every run has its own.
+  /// Name of the place where the tracker stands. Runs with the same name have the same offset of
+  /// the ranges, because home position and reflector are the same. Empty: every run has its own
+  /// offset.
   std::string tracker_place{};
   std::optional<TrackerVertical> tracker_vertical;          ///< nullopt: not levelled
-  std::optional<std::array<double, 3>> tracker_position_m;  ///< machine axes, to 0.5 m
+  std::optional<std::array<double, 3>> tracker_position_m;  ///< in machine axes, accurate to 0.5 m
   [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
   friend bool operator==(const MachineConfig&, const MachineConfig&) = default;
 };
@@ -84,7 +86,7 @@ struct ThermalConfig {
   double fixed_m = 0.0;  ///< reading where the scale is fixed to the machine
 };
 
-/// Of the refractive index.
+/// Equation for the refractive index of air.
 enum class AirEquation { Ciddor, Edlen, ShopFloor };
 
 /// [air]: the refractive index of air, computed from measured values.
@@ -95,15 +97,16 @@ struct AirConfig {
   double u_temperature_K = 0.2;
   double u_pressure_Pa = 30.0;
   double u_relative_humidity = 0.03;
-  /// CO2 is not measured; people and burners add 50 to 1000 ppm to the 430 ppm outdoors
+  /// Standard uncertainty of the CO2 content, which is not measured: people and burners add 50 to
+  /// 1000 ppm to the 430 ppm outdoors.
   double u_co2_ppm = 200.0;
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};  ///< an older value is not used
-  /// The refractive index with which the tracker computed its distances. If given, abbe corrects
-  /// the distances for the measured air.
+  /// The refractive index that the tracker used to compute its distances. If it is given, abbe
+  /// corrects the distances for the measured air.
   std::optional<double> assumed_index;
 };
 
-/// [[sensors.limit]]: what the readings of one sensor are checked against, in K, Pa or as a ratio.
+/// Limits for the readings of one sensor, in K, Pa or as a ratio. One [[sensors.limit]] table.
 /// nullopt: the default of the kind of sensor (sensor_options.hpp of pipeline).
 struct SensorLimitConfig {
   /// one of Config::temperatures, "air_temperature", "air_pressure" or "relative_humidity"
@@ -111,7 +114,7 @@ struct SensorLimitConfig {
   std::optional<double> lowest, highest;
   std::optional<double> most_per_s;
   std::optional<double> tolerance;
-  std::string twin;  ///< the temperature at the same place; empty: none
+  std::string twin;  ///< another temperature sensor at the same place, for comparison; empty: none
   double most_twin_difference_K = 1.0;
 };
 
@@ -131,7 +134,7 @@ struct SensorsConfig {
 
 using drivers::RealTimeMode;
 
-/// [daemon]
+/// Table [daemon].
 struct DaemonConfig {
   std::filesystem::path data_dir = "/var/lib/abbe";
   [[nodiscard]] std::filesystem::path models_dir() const { return data_dir / "models"; }
@@ -146,14 +149,14 @@ struct DaemonConfig {
   int tracker_priority = 40;  ///< SCHED_FIFO, 1 to 99
   int encoder_priority = 50;
   int hub_priority = 30;
-  std::optional<int> tracker_cpu;  ///< the CPU core to which the thread is bound
+  std::optional<int> tracker_cpu;  ///< CPU core to which the tracker's device thread is bound
   std::optional<int> encoder_cpu;
   std::optional<int> hub_cpu;
   /// Limit of the wake-up latency of the CPU (/dev/cpu_dma_latency). nullopt: not requested.
   std::optional<std::chrono::microseconds> cpu_latency;
 };
 
-/// [recording]
+/// Table [recording].
 struct RecordingConfig {
   std::filesystem::path dir;  ///< default: data_dir/recordings
   std::uint32_t chunk_bytes = 256 * 1024;
@@ -167,12 +170,13 @@ struct RecordingConfig {
   std::chrono::hours keep{0};
 };
 
-/// [models]: which models the store keeps besides those in force. A model is removed only if it is
-/// neither among the newest nor younger than `keep`: a clock that is ahead removes none of the
-/// newest.
+/// [models]: which models the store keeps besides the models in force. A model is removed only if
+/// it is older than `keep` and not among the `keep_newest` newest. A clock that is ahead therefore
+/// removes none of the newest models.
 struct ModelRetention {
   std::size_t keep_newest = 0;  ///< models added last that are kept at any age; 0: keep all
-  std::chrono::hours keep{0};   ///< [models] keep_days; models that were added later are kept
+  /// [models] keep_days: models that were added more recently are kept
+  std::chrono::hours keep{0};
 };
 
 /// [gate]: the conditions that a model must satisfy before it may become active.
@@ -217,7 +221,8 @@ struct OtfConfig {
   OtfBacklash backlash = OtfBacklash::None;
   std::vector<NestConfig> nests{};
   double u_nest_repeatability_m = 3e-6;  ///< of one visit of a nest, per coordinate
-  /// Prior for smooth tables of X, Y, Z: bend over three nodes 50 mm apart; 0: none of this axis.
+  /// Prior for smooth tables of X, Y and Z: bend over three nodes 50 mm apart. 0: no prior for this
+  /// axis.
   std::optional<std::array<double, 3>> smoothness_m{};
 };
 
@@ -232,10 +237,10 @@ struct DriftConfig {
   /// Process noise of every table: standard deviation of its change in a day.
   double length_m_per_root_day = 0.5e-6;
   double angle_rad_per_root_day = 1e-6;
-  /// The offset of the ranges of a named place of the tracker counts as a new one after this time
-  /// without an update from there.
+  /// A tracker place that had no update for this time gets a new offset of the ranges.
   double place_days = 30.0;
-  std::map<std::string, double> of_tables{};  ///< of single tables, m or rad per root of a day
+  /// process noise of single tables by name, m or rad per root of a day
+  std::map<std::string, double> of_tables{};
 };
 
 /// [evemu] artefact_sensor or artefact_C, [mfb] bar_sensor: temperature of an artefact while it is
@@ -251,7 +256,7 @@ struct ArtefactTemperatureConfig {
 struct EvemuConfig {
   std::string estimator = "bayes-pose";  ///< bayes-pose, ols, ridge, lasso, mcp, scad
   std::string folds = "position";        ///< position, ball, row: for lasso, mcp, scad
-  int order = 3;                         ///< of the polynomials
+  int order = 3;                         ///< order of the error polynomials
   /// Positions of the array, in the order in which they are touched.
   std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};
   std::size_t points_per_ball = 25;
@@ -298,10 +303,10 @@ struct Config {
   EvemuConfig evemu;
   MfbConfig mfb{};
   ControlConfig control;
-  /// Of the tables above, made while they were read.
+  /// The meaning of the readings, collected while the tables above were read.
   Meaning meaning;
 
-  /// The devices of a kind, as in DeviceConfigs: an optional, or a vector.
+  /// The devices of one kind, as in DeviceConfigs: an optional or a vector.
   template <class Kind>
   [[nodiscard]] auto& of() noexcept {
     return devices_of<Kind>(devices);
@@ -333,8 +338,8 @@ struct Config {
 [[nodiscard]] Result<Config> parse_recorded_config(std::string_view text,
                                                    const std::filesystem::path& file);
 
-/// What [[environment]] contributes to Config::meaning: the sensors whose values correct a reading.
-/// The others are only recorded: adding or changing one must not end a model.
+/// The part of Config::meaning that comes from [[environment]]: only sensors whose values correct a
+/// reading. Adding or changing another sensor, which is only recorded, must not end a model.
 [[nodiscard]] Meaning environment_meaning(const Config& config);
 
 /// SHA-256 in hex over Meaning::readings: the machine and all that gives an axis reading its
@@ -342,14 +347,14 @@ struct Config {
 /// Noise values and transport settings are not included.
 [[nodiscard]] std::string machine_hash(const Config& config);
 
-/// The hash of model files without a list of the configuration, from earlier versions. It covers
-/// the machine (name, chain, axes, target, nodes) and of the readings: correction by the control,
-/// axis, node or channel, step, offset, reference marks, expansion of the scale.
+/// The hash in model files of earlier versions, which do not list the configuration. It covers the
+/// machine (name, chain, axes, target, nodes) and these properties of the readings: correction by
+/// the control, axis, node or channel, step, offset, reference marks, expansion of the scale.
 [[nodiscard]] std::string former_machine_hash(const Config& config);
-/// The entries that the former hash did not cover.
+/// The entries of `readings` that former_machine_hash() does not cover.
 [[nodiscard]] MeaningEntries not_in_former_hash(MeaningEntries readings);
 
-/// Replaces [target] offset_mm, for a run whose target is known otherwise.
+/// Replaces [target] offset_mm, for a run whose target offset does not come from the configuration.
 void set_target_offset(Config& config, const std::array<double, 3>& offset_m);
 
 }  // namespace abbe::daemon

@@ -1,6 +1,7 @@
 #pragma once
-/// The kinds of devices that a configuration can have, one line each, in the order in which their
-/// tables are read and shown. drivers/docs/adding_a_device.md describes how to add a kind.
+/// The kinds of devices that a configuration can have, one per line. Their order is the order in
+/// which their tables are read and shown. drivers/docs/adding_a_device.md describes how to add a
+/// kind.
 
 #include <optional>
 #include <tuple>

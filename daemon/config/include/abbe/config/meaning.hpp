@@ -1,8 +1,8 @@
 #pragma once
-/// What gives the axis readings their meaning, as a list of configuration keys with their values in
-/// use, defaults included. A model corrects readings, so it is valid only for readings of the same
-/// meaning. The list is made while the configuration is read (classified_section.hpp): every key of
-/// a device states there whether it belongs to this list. Pure.
+/// The configuration keys that determine what the axis readings mean, with their values in use,
+/// defaults included. A model corrects readings, so it is valid only for readings of the same
+/// meaning. The list is made while the configuration is read (classified_section.hpp): the code
+/// that reads a key of a device states whether the key belongs to this list. Pure.
 
 #include <string>
 #include <string_view>
@@ -21,10 +21,11 @@ struct MeaningEntry {
 using MeaningEntries = std::vector<MeaningEntry>;
 
 struct Meaning {
-  /// What the axis readings mean. It is in machine_hash().
+  /// Keys that determine what the axis readings mean. machine_hash() covers these entries.
   MeaningEntries readings;
-  /// What the devices deliver that measure the errors (tracker, probe). A model does not become
-  /// wrong when they change or are removed, so this is kept with a model and not in the hash.
+  /// Keys of the devices that measure the errors (tracker, probe). They are stored with a model,
+  /// but machine_hash() does not cover them: a model stays valid when such a device changes or is
+  /// removed.
   MeaningEntries measurements;
 
   friend bool operator==(const Meaning&, const Meaning&) = default;
@@ -42,17 +43,18 @@ void take_entries(MeaningEntries& entries, const MeaningEntries& other,
 /// SHA-256 in hex over the entries.
 [[nodiscard]] std::string hash_of(const MeaningEntries& entries);
 
-/// Values with 12 digits, which are more than any of them is known to.
+/// Numbers as text with 12 digits, which exceeds the accuracy of every value.
 [[nodiscard]] std::string number_text(double value);
 [[nodiscard]] std::string numbers_text(const std::vector<double>& values, double per_si);
 
 /// How two lists differ.
 struct MeaningDifference {
-  /// "[TABLE] was configured, is not": tables and elements that only one of the lists has.
+  /// Tables and elements that only one of the lists has: "[TABLE] was configured, is not".
   std::vector<std::string> tables;
-  std::vector<std::string> changed;  ///< "[TABLE] X step_nm was 10, is 11"
-  /// Entries that only the present list has, of tables and elements that both lists have. An
-  /// earlier version of abbe did not have them.
+  /// entries with different values: "[TABLE] X step_nm was 10, is 11"
+  std::vector<std::string> changed;
+  /// Entries that only the present list has although both lists have their table and element. The
+  /// other list was written by an earlier version of abbe, which did not have these keys.
   MeaningEntries added;
 };
 [[nodiscard]] MeaningDifference difference(const MeaningEntries& before,

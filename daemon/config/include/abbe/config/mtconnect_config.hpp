@@ -14,8 +14,8 @@ namespace abbe::daemon {
 struct MtconnectConfig {
   std::string address = "127.0.0.1";  ///< numeric IPv4 or IPv6 address to listen on
   std::uint16_t port = 7878;          ///< 0: any free port, which abbe-mtconnect prints
-  /// Sent to an agent in "* PONG". The agent sends "* PING" with this period; both sides close the
-  /// connection after twice this time without an answer.
+  /// This time is sent to an agent in "* PONG". The agent then sends "* PING" with this period.
+  /// Either side closes the connection if the other one is silent for twice this time.
   std::chrono::nanoseconds heartbeat = std::chrono::seconds{10};
 };
 
@@ -24,7 +24,7 @@ struct MtconnectSettings {
   MtconnectConfig mtconnect;
 };
 
-/// Reads and checks the whole abbed.toml, as load_config() does. Any thread.
+/// Reads and checks the whole abbed.toml as load_config() does and returns [mtconnect]. Any thread.
 [[nodiscard]] Result<MtconnectSettings> load_mtconnect_settings(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

@@ -15,20 +15,21 @@
 
 namespace abbe::daemon {
 
-/// What is reported.
+/// The kinds of events that are reported.
 enum class NotifyKind : std::uint8_t {
   CalibrationAccepted,
   CalibrationRefused,
-  PersonNeeded,  ///< READY, the next touch, a machine that waits for its release
+  /// somebody must act: READY, the next touch, or a machine that waits for its release
+  PersonNeeded,
   StartMissed,
-  DeviceLost,     ///< not connected, or it reports what is wrong
-  Drift,          ///< the model is DRIFT
-  ModelNotValid,  ///< the model is STALE, INVALID, or gone: compensation stops
-  StorageFailed,  ///< recorder or model store
+  DeviceLost,     ///< a device is not connected or reports a fault
+  Drift,          ///< the state of the model is DRIFT
+  ModelNotValid,  ///< the model is STALE, INVALID or no longer there: compensation stops
+  StorageFailed,  ///< the recorder or the model store failed
   NotReachable,   ///< abbed does not answer, or it restarted
 };
 
-/// The words of `events`, in the order of NotifyKind.
+/// The words of the key `events`, in the order of NotifyKind.
 inline constexpr std::array<std::string_view, 9> kNotifyKindNames{
     "calibration_accepted", "calibration_refused", "person_needed",
     "start_missed",         "device_lost",         "drift",
@@ -38,27 +39,28 @@ inline constexpr std::array<std::string_view, 9> kNotifyKindNames{
 }
 
 struct NotifyWebhook {
-  std::string url;                 ///< http or https; empty: it is in url_file
-  std::filesystem::path url_file;  ///< one line, for receivers whose URL is a secret
+  std::string url;                 ///< http or https; empty: url_file contains the URL
+  std::filesystem::path url_file;  ///< file with one line, for receivers whose URL is a secret
   std::string header = "Authorization";
-  std::filesystem::path token_file;  ///< one line, the value of `header`; empty: no header
+  /// file with one line, the value of `header`; empty: no header
+  std::filesystem::path token_file;
 };
 
 struct NotifyMail {
   std::string server;    ///< "smtps://HOST:PORT" or "smtp://HOST:PORT"; empty: no mail
-  bool starttls = true;  ///< for smtp://: required of the server
+  bool starttls = true;  ///< for smtp://: true if the server must offer STARTTLS
   std::string from;
   std::vector<std::string> to;
   std::string user;                     ///< empty: no login
-  std::filesystem::path password_file;  ///< one line
+  std::filesystem::path password_file;  ///< file with one line
 };
 
 struct NotifyConfig {
-  std::vector<NotifyKind> events;  ///< default: all
-  /// abbed that has just started connects to its devices: what is wrong during this time is not
-  /// reported. Also the time without an answer after which abbed is not reachable.
+  std::vector<NotifyKind> events;  ///< kinds of events that are reported; default: all
+  /// A fault is not reported during this time after the start of abbed, while abbed connects to its
+  /// devices. abbed is reported as not reachable if it does not answer for this time.
   std::chrono::nanoseconds settle = std::chrono::seconds{10};
-  /// Certificates (PEM) that are trusted besides those of the computer; empty: none.
+  /// File of certificates (PEM) that are trusted in addition to those of the computer; empty: none.
   std::filesystem::path ca_file;
   std::vector<NotifyWebhook> webhooks;
   NotifyMail mail;
@@ -67,18 +69,20 @@ struct NotifyConfig {
 
 struct NotifySettings {
   std::filesystem::path control_socket = "/run/abbe/control.sock";
-  std::string machine;  ///< [machine] name
+  std::string machine;  ///< value of [machine] name
   NotifyConfig notify;
 };
 
-/// Reads and checks the whole abbed.toml, as load_config() does, and that the files that [notify]
-/// names exist and are not readable by others. Any thread.
+/// Reads and checks the whole abbed.toml as load_config() does and returns [notify]. Also checks
+/// that the files that [notify] names exist and are not readable by others. Any thread.
 [[nodiscard]] Result<NotifySettings> load_notify_settings(const std::filesystem::path& file);
 
-/// Why `url` cannot be used for a webhook; empty: it can. `with_token`: a token is sent there.
+/// The reason why `url` cannot be used for a webhook; empty if it can be used. `with_token`: the
+/// request contains a secret token.
 [[nodiscard]] std::string webhook_url_fault(std::string_view url, bool with_token);
 
-/// "https://hooks.example.com": without path, which may be a secret.
+/// Scheme and host of the URL: "https://hooks.example.com". The path is left out because it may be
+/// a secret.
 [[nodiscard]] std::string scheme_and_host(std::string_view url);
 
 }  // namespace abbe::daemon

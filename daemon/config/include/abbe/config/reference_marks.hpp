@@ -16,7 +16,7 @@ namespace abbe::daemon {
 struct AxisMarks {
   std::string axis;
   drivers::DistanceCode code;
-  double signal_period = 20e-6;  ///< of the scale, m or rad
+  double signal_period = 20e-6;  ///< signal period of the scale, m or rad
   double zero_mark = 0.0;        ///< reading at the zero mark of the scale, m or rad
   bool reversed = false;         ///< position on the scale ascends while the reading descends
 };

@@ -15,9 +15,10 @@ namespace abbe::daemon {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(longer);
 }
 
-/// stretched(), for the silence after which a device has a fault. The operating system stops a
-/// simulated device, which shares the processors with other programs, for longer than many a
-/// device may be silent: at `speed` > 1 the silence lasts at least a second of its clock.
+/// As stretched(), for the silence after which a device is faulty. The operating system may suspend
+/// a simulated device for longer than this silence, because the device shares the processors with
+/// other programs. At `speed` > 1 the result is therefore at least one second of the operating
+/// system's clock.
 [[nodiscard]] inline std::chrono::nanoseconds stretched_silence(std::chrono::nanoseconds silence,
                                                                 double speed) {
   constexpr std::chrono::nanoseconds kLongestPause = std::chrono::seconds{1};

@@ -25,9 +25,9 @@ struct AssumedAir {
 /// for the range of air on shop floors: 1.05e-5.
 [[nodiscard]] double u_of_unmeasured_air() noexcept;
 
-/// Text for verdict and status: for which air the distances are corrected, and the uncertainty
-/// `u_scale` that the model assumes for this. nullopt if the distances are corrected for measured
-/// air.
+/// Text for verdict and status. It states for which air the distances are corrected, and the
+/// uncertainty `u_scale` that the model assumes because of this. nullopt if the distances are
+/// corrected for measured air.
 [[nodiscard]] std::optional<std::string> unmeasured_air_text(const Config& config, double u_scale);
 
 }  // namespace abbe::daemon

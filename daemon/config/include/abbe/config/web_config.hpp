@@ -21,13 +21,14 @@ struct WebConfig {
   /// Names of this computer in the address line of a browser, besides `address` and localhost. A
   /// request for another name is refused (DNS rebinding).
   std::vector<std::string> host_names;
-  /// File of `abbe-web --hash-password`; empty: nobody can log in.
+  /// File written by `abbe-web --hash-password`; empty: nobody can log in.
   std::filesystem::path users;
   bool view_without_login = true;
-  /// A session ends after this time without a request of its browser; events are not requests.
+  /// A session ends after this time without a request of its browser; the stream of events to the
+  /// page does not count as a request.
   std::chrono::nanoseconds session_idle = std::chrono::minutes{30};
   double live_hz = 25.0;        ///< rate of the axis positions
-  std::size_t most_pages = 16;  ///< pages that receive events at the same time
+  std::size_t most_pages = 16;  ///< most pages that receive events at the same time
   [[nodiscard]] bool tls() const noexcept { return !certificate.empty(); }
 };
 
@@ -36,7 +37,7 @@ struct WebSettings {
   WebConfig web;
 };
 
-/// As load_config(), with [web]. Any thread.
+/// Reads and checks the whole abbed.toml as load_config() does and returns [web]. Any thread.
 [[nodiscard]] Result<WebSettings> load_web_settings(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

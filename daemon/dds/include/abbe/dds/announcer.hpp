@@ -24,7 +24,7 @@ namespace abbe::dds {
 class Announcer final : private eprosima::fastdds::dds::DomainParticipantListener {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
-  /// Interval after a discovery; every further interval is twice as long, up to kPeriod.
+  /// First interval after a discovery; every further interval is twice as long, up to kPeriod.
   static constexpr std::chrono::milliseconds kFirst{20};
   static constexpr std::chrono::milliseconds kPeriod{2000};
 

@@ -47,7 +47,7 @@ class InterfaceWatch {
  private:
   int netlink_ = -1;
   Clock::time_point begun_;
-  /// since the interfaces were last read
+  /// times of the first and the last change since the interfaces were last read
   std::optional<Clock::time_point> first_change_, last_change_;
   std::vector<InterfaceAddress> known_;  ///< sorted
 };

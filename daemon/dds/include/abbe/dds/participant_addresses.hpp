@@ -21,7 +21,8 @@ class ParticipantAddresses final : private eprosima::fastdds::dds::DomainPartici
   ParticipantAddresses(const ParticipantAddresses&) = delete;
   ParticipantAddresses& operator=(const ParticipantAddresses&) = delete;
 
-  /// For example "192.168.10.7"; several addresses are separated by commas. Empty: not known.
+  /// The announced addresses of a participant, for example "192.168.10.7", separated by commas.
+  /// Empty: not known.
   [[nodiscard]] std::string of(const ParticipantId& id) const;
 
  private:

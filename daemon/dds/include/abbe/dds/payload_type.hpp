@@ -14,10 +14,11 @@
 
 namespace abbe::dds {
 
-/// The instances into which a reader divides what it receives, by a hash of the key. Strangers may
-/// make up any number of keys, and Fast DDS 2.9 aborts where the table of instances is full
-/// (DataReaderHistory.cpp:822). Of two keys with the same instance the later sample replaces one
-/// that was not taken yet; slices of one machine have different instances.
+/// Number of instances into which a reader divides the received samples, by a hash of the key.
+/// Other participants may send any number of keys, and Fast DDS 2.9 aborts when its table of
+/// instances is full (DataReaderHistory.cpp:822). If two keys share an instance, the later sample
+/// replaces an earlier one that was not taken yet. Slices of one machine always have different
+/// instances.
 inline constexpr int kReceivedInstances = 1024;
 
 /// The data that a PayloadType serializes: the encapsulation header and the CDR bytes.
@@ -34,8 +35,8 @@ class PayloadType final : public eprosima::fastdds::dds::TopicDataType {
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override;
   std::function<uint32_t()> getSerializedSizeProvider(void* data) override;
   /// MD5 of the key as big-endian CDR [DDSI-RTPS 2.5, 9.6.3.8]. Always MD5, because the key of
-  /// every abbe topic may be longer than 16 bytes. Of a received payload: its instance, one of
-  /// kReceivedInstances.
+  /// every abbe topic may be longer than 16 bytes. For a received payload the result is its
+  /// instance, one of kReceivedInstances.
   bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
               bool force_md5) override;
   void* createData() override { return new Payload; }

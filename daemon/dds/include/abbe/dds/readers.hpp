@@ -42,8 +42,8 @@ class Readers {
   void wait(std::chrono::milliseconds at_most);
 
   /// Calls `on_arrival` for every sample that has arrived, topic by topic in the order given to
-  /// create(); before each one also for the Identities that have arrived by then. The payload is
-  /// not validated and may come from any participant: use daemon::decode.
+  /// create(). Before each of these samples it also passes the Identities that have arrived by
+  /// then. The payload is not validated and may come from any participant: use daemon::decode.
   void take(const OnArrival& on_arrival);
 
   /// True while this writer of ModelState keeps its lease; false also if `topics` of create() did

@@ -19,7 +19,8 @@ namespace abbe::dds {
 struct Decision {
   bool apply = false;
   std::string reason;  ///< "ACTIVE" if applied
-  /// Of a vector that may be applied: from now on; then it is older than its validity.
+  /// Time for which a vector may be applied, counted from now. After this time the vector is older
+  /// than its validity.
   std::chrono::nanoseconds valid_for{0};
 };
 
@@ -27,8 +28,9 @@ class ReceivedModel {
  public:
   void state(v1::ModelState state);
   void model(v1::ErrorModel model) { model_ = std::move(model); }
-  /// Keeps the slice under its model id. Slices of several models are kept: those of the next model
-  /// arrive before its ModelState, and a late joiner may also receive slices of an old model.
+  /// Keeps the slice under the id of its model. Slices of several models are kept at the same time:
+  /// slices of the next model arrive before its ModelState, and a late joiner may also receive
+  /// slices of an old model.
   void slice(v1::ErrorGrid slice);
 
   [[nodiscard]] const std::optional<v1::ModelState>& state() const noexcept { return state_; }
@@ -38,7 +40,7 @@ class ReceivedModel {
   /// slice is missing.
   [[nodiscard]] std::optional<std::vector<v1::GridNode>> grid() const;
 
-  /// Of all models whose slices are kept.
+  /// Number of nodes in the slices that are kept, over all models.
   [[nodiscard]] std::size_t kept_nodes() const;
 
   /// Whether the received grid may be applied. `publisher_alive`: the writer of ModelState has not
@@ -49,7 +51,7 @@ class ReceivedModel {
   std::optional<v1::ModelState> state_;
   std::optional<v1::ErrorModel> model_;
   using Slices = std::map<std::uint32_t, v1::ErrorGrid>;
-  std::map<std::string, Slices> slices_;  // by model
+  std::map<std::string, Slices> slices_;  // by model id
 };
 
 /// Whether this compensation vector may be applied. `delay`: the transit delay from Delay::of();
@@ -74,10 +76,10 @@ class Delay {
   [[nodiscard]] std::optional<std::chrono::nanoseconds> of(const v1::Compensation& vector,
                                                            Instant now);
 
-  /// The initial value for the next publisher, which may have the same clock as this one, for
+  /// The initial estimate for the next publisher, which may have the same clock as this one, for
   /// example after a restart of abbe-dds. With the same clock the sum of clock offset and shortest
-  /// transit time stays valid. If this sum for the first vector differs from the stored one by more
-  /// than kSameClock, the next publisher has another clock and the estimate starts again.
+  /// transit time stays valid. If the first vector of the next publisher gives a sum that differs
+  /// by more than kSameClock, that publisher has another clock and the estimate starts again.
   [[nodiscard]] Delay for_next_publisher() const;
   static constexpr std::chrono::milliseconds kSameClock{20};
 

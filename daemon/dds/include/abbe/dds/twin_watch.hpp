@@ -1,8 +1,9 @@
 #pragma once
-/// Looks for other publishers in the domain that claim to be this machine: the same name with
-/// another identity (a copied configuration), or the same identity (a copied disk). abbe-dds reads
-/// the topic Identity of all participants for this, and remembers the last claims of this name or
-/// identity: strangers that publish other ones do not hide a twin. Used by one thread.
+/// Looks for other publishers in the domain that claim to be this machine: with the same name and
+/// another identity (a copied configuration), or with the same identity (a copied disk). For this,
+/// abbe-dds reads the topic Identity of all participants. It stores only the last claims of this
+/// name or this identity, so that other publishers in any number do not hide such a twin. Used by
+/// one thread.
 
 #include <chrono>
 #include <cstddef>
@@ -19,19 +20,21 @@ namespace abbe::dds {
 class TwinWatch {
  public:
   using Instant = std::chrono::steady_clock::time_point;
-  /// A publisher repeats its Identity every second. One that was silent for longer is gone.
+  /// A publisher repeats its Identity every second. A publisher that was silent for longer than
+  /// kGone no longer counts.
   static constexpr std::chrono::seconds kGone{5};
   static constexpr std::chrono::milliseconds kPeriod{100};
 
-  /// `participant` must outlive this object. Without a reader, because permissions of DDS Security
-  /// from an earlier version do not allow it, no twin is seen; looks() is then false.
+  /// `participant` must outlive this object. Permissions of DDS Security from an earlier version
+  /// may not allow the reader. Then no twin is detected, and looks() returns false.
   explicit TwinWatch(Participant& participant);
 
   [[nodiscard]] bool looks() const noexcept { return readers_.has_value(); }
 
-  /// Reads what has arrived, at most every kPeriod. `own`: the payload of the last Identity that
-  /// this participant published; empty: none yet. Returns in words the twin that was seen first,
-  /// one of the same identity before one of the same name, and how many there are; empty: none.
+  /// Reads the Identities that have arrived, at most once per kPeriod. `own`: the payload of the
+  /// last Identity that this participant published; empty: none yet. Returns a text with the number
+  /// of twins and the twin that was seen first; a twin with the same identity comes before one with
+  /// the same name. Empty: no twin.
   [[nodiscard]] std::string cycle(std::span<const std::byte> own, Instant now);
 
  private:

@@ -28,7 +28,7 @@ class Writers final : public daemon::DdsOutlet {
 
   void dispose(daemon::Topic topic, std::span<const std::byte> payload) override;
 
-  /// The last payload of Identity that was written; empty: none.
+  /// The payload of the Identity that was written last; empty: none was written.
   [[nodiscard]] std::span<const std::byte> identity() const noexcept { return identity_; }
 
   /// Asserts the liveliness of the ModelState writer.

@@ -1,7 +1,8 @@
 #pragma once
-/// The kinds of devices that abbed supports. What one kind needs (driver options, driver, thread,
-/// rings, raw decoder, health) is in one file of src; device_kinds() lists them. The device set and
-/// a replay iterate over this list; drivers/docs/adding_a_device.md describes how to add a kind.
+/// The kinds of devices that abbed supports. One file of src contains everything for one kind:
+/// driver options, driver, thread, rings, raw decoder, health. device_kinds() lists the kinds. The
+/// device set and a replay iterate over this list; drivers/docs/adding_a_device.md describes how to
+/// add a kind.
 
 #include <array>
 #include <chrono>
@@ -24,8 +25,8 @@
 
 namespace abbe::daemon {
 
-/// A device that moves and probes under its own control (a measuring machine). SampleSource
-/// describes the functions, which have the same names there.
+/// A device that moves and probes under its own control (a measuring machine). SampleSource has
+/// functions of the same names and describes them.
 class MachineMotion {
  public:
   MachineMotion() = default;
@@ -40,8 +41,8 @@ class MachineMotion {
   [[nodiscard]] virtual drivers::IppStop last_stop() const = 0;
   /// May be called from any thread; takes no lock. Stops the motion and ends the session.
   virtual void end() = 0;
-  /// As end(), and waits until the motion is stopped or it is known that this cannot be confirmed.
-  /// Ends the device thread. The last call.
+  /// As end(), but waits until the motion is stopped or until it is known that the stop cannot be
+  /// confirmed. Ends the device thread. No other function may be called afterwards.
   virtual drivers::IppStop finish() = 0;
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const = 0;
   [[nodiscard]] virtual Result<void> release() = 0;
@@ -50,7 +51,8 @@ class MachineMotion {
   [[nodiscard]] virtual Result<std::array<double, 3>> position() const = 0;
 };
 
-/// A tracker that carries out orders (find the reflector, go to the home position).
+/// A tracker that carries out orders, for example to find the reflector or to go to the home
+/// position.
 class TrackerOrders {
  public:
   TrackerOrders() = default;
@@ -73,11 +75,12 @@ class RunningDevices {
   RunningDevices& operator=(const RunningDevices&) = delete;
   virtual ~RunningDevices() = default;
 
-  /// Appends what arrived since the last call. For each device, the samples are drained before the
-  /// raw bytes, while a driver delivers the bytes before the samples decoded from them. Therefore
-  /// bytes are never drained in a later cycle than their samples, on which a replay relies.
+  /// Appends the samples and raw bytes that arrived since the last call. For each device the
+  /// samples are drained before the raw bytes, while a driver delivers the bytes before the samples
+  /// decoded from them. Bytes are therefore never drained in a later cycle than their samples; a
+  /// replay relies on this.
   virtual void drain(Batch& batch) = 0;
-  /// For each device in the health report the thread that runs it, in the order of the
+  /// The device threads, one for each device in the health report, in the order of the
   /// configuration.
   [[nodiscard]] virtual std::vector<const drivers::DeviceThread*> threads() const = 0;
   /// One sentence for each real-time setting that the operating system refused (real-time mode
@@ -87,7 +90,8 @@ class RunningDevices {
   /// Samples per second that each device sends while its state is "streaming"; 0: not known.
   [[nodiscard]] virtual double nominal_rate_hz() const { return 0.0; }
 
-  // Functions of some kinds only. null or nullopt: this kind of device does not have the function.
+  // Functions of some kinds only. A result of null or nullopt means that this kind of device does
+  // not have the function.
   [[nodiscard]] virtual MachineMotion* motion() noexcept { return nullptr; }
   [[nodiscard]] virtual TrackerOrders* orders() noexcept { return nullptr; }
   /// The latest state of the counters that drain() has read. The samples up to this state are
@@ -137,7 +141,7 @@ struct DeviceKind {
                                            const std::optional<CountingProgress>& left);
 };
 
-/// In the order of the health report.
+/// All kinds, in the order of the health report.
 [[nodiscard]] std::span<const DeviceKind> device_kinds();
 
 }  // namespace abbe::daemon

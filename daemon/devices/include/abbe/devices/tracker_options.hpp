@@ -15,10 +15,10 @@ namespace abbe::daemon {
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config,
                                                            double speed);
 
-/// As device_options(), for a tracker with lines.
+/// As device_options(), for a tracker that sends its points as lines of text.
 [[nodiscard]] drivers::LineTrackerOptions line_options(const TrackerConfig& config, double speed);
 
-/// Options for a tracker with lines whose table has this text.
+/// The options from the text of the configuration table of a tracker that sends lines of text.
 [[nodiscard]] Result<drivers::LineTrackerOptions> parse_line_options(std::string_view table);
 
 }  // namespace abbe::daemon

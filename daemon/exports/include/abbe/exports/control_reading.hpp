@@ -13,7 +13,7 @@
 
 namespace abbe::daemon {
 
-/// What the control knows besides its compensation files.
+/// Settings of the control that are not in its compensation files.
 struct ControlSettings {
   std::array<std::string, 3> axis_names{"X", "Y", "Z"};
   int positive_moves = 1;

@@ -1,5 +1,6 @@
 #pragma once
-/// The file formats of controls. What each control does with its files: daemon/docs/exports.md.
+/// The file formats of controls. daemon/docs/exports.md describes what each control does with its
+/// files.
 
 #include <array>
 #include <cstddef>
@@ -20,7 +21,7 @@ enum class ExportFormat {
   CsvGrid
 };
 
-/// Which part of a correction a format holds.
+/// Which part of a correction a file of the format can contain.
 enum class HeldPart {
   Errors,        ///< the error tables of a machine, rotations with levers
   Positioning,   ///< a table for each axis, a function of its own position
@@ -30,26 +31,26 @@ enum class HeldPart {
 
 struct FormatFacts {
   ExportFormat format;
-  std::string_view name;     ///< as in --to
-  std::string_view control;  ///< for people
+  std::string_view name;     ///< name of the format in the option --to
+  std::string_view control;  ///< name of the control, in messages
   HeldPart holds;
-  bool per_direction = false;  ///< separate values for both directions of travel
+  bool per_direction = false;  ///< the file has separate values for both directions of travel
   bool equidistant = false;
-  std::size_t most_nodes = 0;  ///< of an axis; 0: no limit is known
-  bool folder = false;         ///< several files
-  bool comments = true;        ///< ExportOrigin is in the file
+  std::size_t most_nodes = 0;  ///< largest number of nodes of an axis; 0: no limit is known
+  bool folder = false;         ///< the export has several files
+  bool comments = true;        ///< the file has comments that contain ExportOrigin
   std::array<std::string_view, 3> axis_names{"X", "Y", "Z"};
   bool axes_named = false;  ///< the file contains names of axes that the control defines
   /// +1 or -1: direction in which a positive value moves the axis; 0: not found in public
   /// documents, the user gives it
   int positive_moves = 0;
-  bool positive_fixed = false;   ///< the user cannot change it
-  std::string_view source = {};  ///< of the sign
+  bool positive_fixed = false;   ///< the user cannot change positive_moves
+  std::string_view source = {};  ///< document from which the sign was taken
 };
 
 [[nodiscard]] const FormatFacts& facts_of(ExportFormat);
 [[nodiscard]] const FormatFacts* format_named(std::string_view name);
-/// "isg-csv, etalon, ..."
+/// The names of all formats as text: "isg-csv, etalon, ...".
 [[nodiscard]] std::string format_names();
 
 /// A file of an export. `name` is empty if the format has one file, whose name the user gives.

@@ -1,5 +1,6 @@
 #pragma once
-/// The proof of a file: read as the control reads it, it must give what was meant at random places.
+/// Proves an exported file: it is read as the control reads it, and must give the intended
+/// correction at random places.
 
 #include <span>
 
@@ -8,8 +9,9 @@
 
 namespace abbe::daemon {
 
-/// Largest difference between a file and what its format can hold: files have 1e-12 m, and the
-/// positions of 5,000 nodes of a constant step at most 1e-9 m.
+/// Largest allowed difference between a file and the correction that its format can hold. Values in
+/// files have a resolution of 1e-12 m; the positions of 5,000 nodes with a constant step deviate by
+/// at most 1e-9 m.
 inline constexpr double kExportTolerance_m = 1e-9;
 inline constexpr std::size_t kExportPlaces = 1000;
 
@@ -18,8 +20,9 @@ struct ExportProof {
   double largest_difference_m = 0.0;
 };
 
-/// BadInput as read_as_control(). Refused if a component differs by more than kExportTolerance_m;
-/// the text names the first place, and an opposite sign as such.
+/// BadInput for a file that read_as_control() does not accept. Refused if a component differs by
+/// more than kExportTolerance_m; the text names the first such place, and states if the sign is
+/// opposite.
 [[nodiscard]] Result<ExportProof> prove_export(ExportFormat, std::span<const ExportFile>,
                                                const ControlSettings&,
                                                std::span<const calib::ExportPlace>,

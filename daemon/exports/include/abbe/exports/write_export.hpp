@@ -1,5 +1,5 @@
 #pragma once
-/// The text of the files of a control. Values are in mm (rotations: rad), positions in mm.
+/// Writes the text of the files of a control. Errors are in mm (rotations in rad), positions in mm.
 
 #include <variant>
 
@@ -12,12 +12,13 @@ namespace abbe::daemon {
 /// What a file states about its origin, where the format has comments.
 struct ExportOrigin {
   std::string model_hash, machine, volume, tool, direction;
-  std::vector<std::string> use{};  ///< statements_of_use(): verdict, who forced the export and why
+  /// the lines of statements_of_use(): verdict, and who forced the export and why
+  std::vector<std::string> use{};
 };
 
 struct WriteOptions {
   std::array<std::string, 3> axis_names{"X", "Y", "Z"};
-  int positive_moves = 1;  ///< FormatFacts::positive_moves, or as the user gives it
+  int positive_moves = 1;  ///< as FormatFacts::positive_moves, or given by the user
   ExportOrigin origin;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Parses the JSON of an attachment of a recording. The size limit of 64 MiB leaves room for the
-/// largest attachment, a requested path: 10^5 vertices are 7 MB.
+/// Parses the JSON of an attachment of a recording. The limit of 64 MiB is enough for the largest
+/// attachment, a requested path: 10^5 vertices are 7 MB.
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/messages/recording_info.hpp"

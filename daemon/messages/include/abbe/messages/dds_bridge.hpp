@@ -1,6 +1,7 @@
 #pragma once
-/// The rules of abbe-dds, without DDS: forwards payloads from abbed (the source) to an outlet, and
-/// reports to the subscribers when abbed is silent. abbed proves that it runs by sending beats.
+/// The logic of abbe-dds, independent of the DDS library. It forwards payloads from abbed (the
+/// source) to an outlet, and informs the subscribers when abbed is silent. abbed regularly sends
+/// beats to show that it runs.
 ///
 /// - Source alive: abbed sent the last beat within kSilence; the time of sending counts, not the
 ///   time of reading. Only while the source is alive, samples other than MODEL_INVALID are written

@@ -40,8 +40,8 @@ struct DdsLinkCounters {
       0;  ///< connections of other processes or users, closed at once
 };
 
-/// Which process may connect, as the kernel reports it (SO_PEERCRED): the supervised abbe-dds;
-/// without supervision, any process of `user`.
+/// The process that may connect; the kernel reports its identity (SO_PEERCRED). With supervision
+/// this is the supervised abbe-dds, without supervision any process of `user`.
 struct DdsLinkPeer {
   /// The supervised process; null without supervision. Must outlive the link, which records in it
   /// the times of beats and answers.
@@ -68,8 +68,8 @@ class DdsLink {
   DdsLink(DdsLink&&) noexcept;
   DdsLink& operator=(DdsLink&&) noexcept;
 
-  /// Sends one payload made by encode(). The key of the instance is read from the payload. `at`:
-  /// the time to which the age in a live sample refers; abbe-dds adds the delay since then.
+  /// Sends one payload that encode() has made. The key of the instance is read from the payload.
+  /// `at`: the time to which the age in a live sample refers; abbe-dds adds the delay since then.
   void publish(Topic topic, std::span<const std::byte> payload,
                WallTime at = WallTime::clock::now());
 

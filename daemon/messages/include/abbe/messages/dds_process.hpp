@@ -35,7 +35,7 @@ class DdsProcess {
   void restarted() noexcept { restarts_.fetch_add(1, std::memory_order_relaxed); }
 
   // Called by the hub's thread.
-  void asked(WallTime now) noexcept;                                  ///< a beat was due
+  void asked(WallTime now) noexcept;  ///< a beat was due at this time
   void answered(WallTime now) noexcept { store(answered_ns_, now); }  ///< abbe-dds answered a beat
 
   /// 0: not running.
@@ -45,11 +45,12 @@ class DdsProcess {
   }
   [[nodiscard]] std::optional<DdsEnd> last_end() const noexcept;
 
-  /// Time from the last answer of abbe-dds to the last beat of the hub. Before the first answer,
-  /// this time counts from the start of abbe-dds; after a pause of more than kPause without a beat,
-  /// from the first beat after that pause.
+  /// Time from the last answer of abbe-dds to the last beat of the hub. Before the first answer the
+  /// time starts at the start of abbe-dds. After a pause of more than kPause without a beat it
+  /// starts at the first beat after the pause.
   [[nodiscard]] std::chrono::nanoseconds silent_for() const noexcept;
-  [[nodiscard]] bool has_answered() const noexcept;  ///< since its last start
+  /// true if abbe-dds has answered since its last start
+  [[nodiscard]] bool has_answered() const noexcept;
 
  private:
   static void store(std::atomic<std::int64_t>& out, WallTime t) noexcept {

@@ -21,8 +21,8 @@
 
 namespace abbe::daemon {
 
-/// Text of the warning that DDS Security is off: what this means and what to do. For the log, `abbe
-/// status` and Health.
+/// Text of the warning that DDS Security is off: the consequences and the remedy. Shown in the log,
+/// in `abbe status` and in Health.
 [[nodiscard]] std::string dds_security_is_off(std::uint32_t domain);
 
 /// The participant profile that abbe's programs use from the XML file of the site.

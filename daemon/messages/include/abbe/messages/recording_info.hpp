@@ -1,6 +1,6 @@
 #pragma once
-/// Description of a recording. The Recorder writes it at the start of every file, the
-/// RecordingReader returns it. Pure data; safe to copy between threads.
+/// Description of a recording. Recorder writes it at the start of every file; RecordingReader
+/// returns it. Pure data; safe to copy between threads.
 
 #include <cstddef>
 #include <string>

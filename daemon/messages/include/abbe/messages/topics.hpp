@@ -1,7 +1,7 @@
 #pragma once
 /// The topics that abbe publishes over DDS, as abbed and abbe-dds use them: number on the local
-/// socket, names, lifetime of a sample, and position of the key in a payload. abbe-dds derives the
-/// QoS from these traits. Pure, thread-safe, no allocation.
+/// socket, names, kind, and position of the key in a payload. abbe-dds derives the QoS from these
+/// traits. Pure, thread-safe, no allocation.
 
 #include <array>
 #include <chrono>
@@ -57,8 +57,8 @@ struct PayloadKey {
   /// bytes belong to the same DDS instance.
   std::span<const std::byte> bytes;
   std::string_view machine;              ///< without its NUL
-  std::optional<std::string_view> text;  ///< MachineAndText: the second text
-  std::optional<std::uint32_t> number;   ///< MachineAndNumber: the number
+  std::optional<std::string_view> text;  ///< for MachineAndText: the second text
+  std::optional<std::uint32_t> number;   ///< for MachineAndNumber: the number
 };
 [[nodiscard]] std::optional<PayloadKey> payload_key(Topic topic,
                                                     std::span<const std::byte> payload) noexcept;

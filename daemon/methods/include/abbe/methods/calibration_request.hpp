@@ -24,11 +24,12 @@ struct CalibrationRequest {
   protocol::HostTime from{};  ///< snapshots before this instant are not used
 };
 
-/// {"method": ..., members of the method's request}. Numbers are written without loss.
+/// The JSON object {"method": ..., members of the method's request}. Numbers are written without
+/// loss.
 [[nodiscard]] nlohmann::json to_json(const CalibrationTask& task);
 /// Reads a request. BadInput names a member that is missing or of the wrong type; Usage for an
-/// unknown method. Optional members that `object` does not contain get their values from `config`;
-/// if `config` is null, from the defaults.
+/// unknown method. Optional members that `object` does not contain get their values from `config`,
+/// or the default values if `config` is null.
 [[nodiscard]] Result<CalibrationTask> task_from_json(const nlohmann::json& object,
                                                      const Config* config = nullptr);
 

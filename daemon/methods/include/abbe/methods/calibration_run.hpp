@@ -1,6 +1,6 @@
 #pragma once
-/// For any method: an acquired run, and the model that is identified from it and judged by the
-/// gate. Pure functions.
+/// Functions for the acquired run of any method: they identify a model from the run, and the gate
+/// judges the model. Pure functions.
 
 #include <array>
 #include <functional>
@@ -39,8 +39,9 @@ using Candidate = Methods::Candidate;
 using ObservedTimes = std::optional<std::array<protocol::HostTime, 2>>;
 [[nodiscard]] ObservedTimes observed(const CalibrationRun& run);
 
-/// Adds when was measured to the conditions of the document, and the duration where the method did
-/// not. `utc`: offset of the host clock of the run. Nothing is added for times that are not known.
+/// Adds the time of the measurement to the conditions of the document, and the duration if the
+/// method has not set it. `utc`: offset of the host clock of the run. Times that are not known add
+/// nothing.
 void add_measured(ModelDocument& document, const ObservedTimes& times, protocol::UtcOffset utc);
 
 }  // namespace abbe::daemon

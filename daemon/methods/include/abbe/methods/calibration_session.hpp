@@ -74,12 +74,12 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// session; the caller destroys it.
   [[nodiscard]] Result<void> start(PreparedSession&& prepared, std::string who,
                                    protocol::HostTime from);
-  /// prepare() and start(), for a replay: no user.
+  /// Calls prepare() and start() without a user, for a replay.
   [[nodiscard]] Result<void> start(CalibrationRequest request);
-  /// Ends a running session as refused; what was acquired stays in the recording. Refused without a
-  /// session, and while a model is being stored.
+  /// Ends a running session as refused; what was acquired stays in the recording. Refused if there
+  /// is no session, and while a model is being stored.
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
-  /// As cancel(), while a model is being stored and the store does not answer.
+  /// As cancel(), but for the time in which a model is being stored and the store does not answer.
   [[nodiscard]] Result<void> give_up_store(std::string who, protocol::HostTime now);
 
   void take(const protocol::Snapshot& snapshot);
@@ -87,9 +87,9 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// only: in a replay the run is incomplete without it and gives no model either.
   void tick(protocol::HostTime now);
 
-  /// What was added to the run since the last call, for tables while the machine moves. nullopt:
-  /// the session is not acquiring, or its method has no such tables. Has no influence on the
-  /// session.
+  /// The points and legs that were added to the run since the last call, for tables that are shown
+  /// while the machine moves. nullopt: the session is not acquiring, or its method has no such
+  /// tables. The call does not change the session.
   [[nodiscard]] std::optional<RunNews> take_news();
   /// The acquired run of a complete session, returned once; nullopt in other stages. The caller
   /// identifies the model and reports the outcome by the functions below.
@@ -100,14 +100,16 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
     return std::exchange(discarded_, std::nullopt);
   }
 
-  /// None could be identified. If the session was cancelled meanwhile, another one can start.
+  /// The identification gave no model. If the session was cancelled meanwhile, another session can
+  /// now start.
   void not_identified(const Error& why, protocol::HostTime now);
   /// A model is identified and judged; the caller stores it.
   void identified(const calib::HeldOutFigures& held_out, protocol::HostTime now);
-  /// The model could not be stored. `fault` states why, `advice` what follows. Adds an event
-  /// whenever the text changes.
+  /// The model could not be stored. `fault` states the cause, `advice` what the user can do. Adds
+  /// an event whenever the text changes.
   void store_failed(std::string fault, std::string_view advice, protocol::HostTime now);
-  /// The store does not answer. As store_failed(), but the caller still waits for the store.
+  /// The store does not answer. As store_failed(), but the caller still waits for the answer of the
+  /// store.
   void store_stalls(std::string fault, std::string_view advice, protocol::HostTime now);
   /// After store_failed(): the caller stores the model again.
   void store_again(protocol::HostTime now) { (void)go(SessionStep::StoreAgain, now); }

@@ -1,6 +1,6 @@
 #pragma once
-/// What a new run says about the active model: a test for drift, and for continuous calibration the
-/// update of the active model with the run. For every method whose models are tables. Pure
+/// Compares a new run with the active model: a test for drift and, for continuous calibration, the
+/// update of the active model with the run. Used by every method whose models are tables. Pure
 /// functions.
 
 #include <optional>
@@ -16,30 +16,34 @@ namespace abbe::daemon {
 
 struct DriftFinding {
   std::optional<calib::DriftTest> test{};  ///< nullopt: not tested
-  std::vector<std::string> notes{};        ///< for the verdict: what changed, or why not tested
-  /// For the state of the active model; empty: no drift.
+  /// for the verdict: the tables that changed, or why the test was not made
+  std::vector<std::string> notes{};
+  /// Description of the drift for the state of the active model; empty: no drift.
   [[nodiscard]] std::string state() const;
 };
 
-/// `active`: the model with which the gate compared the run. Not tested if the configuration
-/// switches it off, if `run` is no model of tables, or if the verdict refuses the run for another
-/// reason than the comparison with the active model (calib::shows_machine).
+/// `active`: the model with which the gate compared the run. The test is not made if the
+/// configuration switches it off, if `run` is no model of tables, or if the verdict refuses the run
+/// for another reason than the comparison with the active model (see calib::shows_machine).
 [[nodiscard]] DriftFinding find_drift(const calib::VolumetricModel& run,
                                       const calib::Verdict& verdict,
                                       const calib::VolumetricModel& active,
                                       const DriftConfig& config);
 
-/// Process noise for `days` since the active model, tables that drifted, and what the run has in
-/// common with all others: the scale of the ranges and of the axes.
+/// Options of the update: process noise for `days` since the active model, the tables that drifted,
+/// and the quantities that the run has in common with all other runs (scale of the ranges and of
+/// the axes).
 [[nodiscard]] calib::UpdateOptions update_options(const CalibrationRun& run,
                                                   const DriftFinding& finding, double days,
                                                   const DriftConfig& config);
 
-/// The offset of the ranges that `active`, made `days` ago, has in common with a run from the place
-/// `run`: of the same name, and not older than [drift] place_days.
+/// The offset of the ranges, if `active`, made `days` ago, has it in common with the run. This is
+/// so if both were measured from a tracker place of the same name, and if the place is not older
+/// than [drift] place_days.
 struct OffsetInCommon {
   std::optional<calib::OffsetInModel> of_active{};
-  std::string note{};  ///< for the verdict: why it is not used; empty: it is, or there is none
+  /// for the verdict: why the common offset is not used; empty: it is used, or there is none
+  std::string note{};
 };
 [[nodiscard]] OffsetInCommon offset_in_common(const std::optional<calib::TrackerPlace>& run,
                                               const std::optional<calib::TrackerPlace>& active,
@@ -50,10 +54,11 @@ struct UpdatedModel {
   calib::Verdict verdict;  ///< held-out figures and notes of the run
 };
 
-/// The active model updated with a run that find_drift() tested. Its verdict has the rules of the
-/// gate for size, slope, volume and scale; that it is better than the active model follows from the
-/// run itself, which agrees with it in all tables that are kept. Refused if tables that drifted do
-/// not explain the difference of both, else as calib::update_model().
+/// The active model, updated with a run that find_drift() tested. The gate's rules for size, slope,
+/// volume and scale decide on its verdict. It is not compared with the active model: the run itself
+/// agrees with the active model in all tables that are kept. Refused if the drifted tables do not
+/// explain the difference between run and active model; other errors are those of
+/// calib::update_model().
 [[nodiscard]] Result<UpdatedModel> updated_model(const calib::ModelWithOffset& run,
                                                  const calib::Verdict& verdict,
                                                  const calib::ModelWithOffset& active,

@@ -50,7 +50,7 @@ consteval auto method_with_part() {
 
 template <class... M>
 struct MethodList {
-  /// How many methods have this part.
+  /// Number of methods that have this part.
   template <class Part>
   static constexpr int kOwners = (int{HasPart<M, Part>} + ...);
   static_assert(((kOwners<typename M::Request> == 1) && ...) &&

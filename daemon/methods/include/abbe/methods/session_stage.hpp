@@ -9,7 +9,8 @@
 
 namespace abbe::daemon {
 
-/// Finer than SessionState, which is recorded, published and shown.
+/// The stages of a session. They are finer than SessionState, which is recorded, published and
+/// shown.
 enum class SessionStage : std::uint8_t {
   Idle,         ///< no session yet
   Warming,      ///< the run has not begun
@@ -21,10 +22,10 @@ enum class SessionStage : std::uint8_t {
   Judged,       ///< the model is stored; the verdict follows at once
   Active,       ///< ended: the gate accepted the model
   Refused,      ///< ended without an active model
-  Ending,       ///< cancelled, while the identification still runs: no other session can start
+  Ending,       ///< cancelled, but the identification still runs: no other session can start
 };
 
-/// What can happen to a session.
+/// The events that may change the stage of a session.
 enum class SessionStep : std::uint8_t {
   Start,
   RunBegins,
@@ -32,7 +33,7 @@ enum class SessionStep : std::uint8_t {
   RunFails,
   RunTaken,
   ModelIdentified,
-  NoModel,  ///< none was identified, or the session was cancelled before
+  NoModel,  ///< no model was identified, or the session was cancelled before
   StoreFails,
   StoreAgain,
   ModelStored,
@@ -86,7 +87,7 @@ inline constexpr auto kSessionTransitions = [] {
   });
 }();
 
-/// nullopt: the step is not possible in this stage.
+/// The stage after `step`; nullopt: the step is not possible in this stage.
 [[nodiscard]] constexpr std::optional<SessionStage> next_stage(SessionStage stage,
                                                                SessionStep step) noexcept {
   for (const SessionTransition& row : kSessionTransitions)

@@ -12,7 +12,7 @@ class TemperatureRange {
  public:
   /// Adds the temperatures that are known at this instant: of the air and of all sensors.
   void take(const protocol::Snapshot& snapshot);
-  /// nullopt: no temperature was known.
+  /// Lowest and highest temperature; nullopt: no temperature was known.
   [[nodiscard]] const std::optional<std::array<double, 2>>& range_K() const { return range_K_; }
 
  private:

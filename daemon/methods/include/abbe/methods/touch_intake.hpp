@@ -1,7 +1,7 @@
 #pragma once
-/// What the guided acquisitions of all methods with a touch probe have in common: the touches of
-/// the run, notes on them, and the ends of a run that do not depend on the method. Decisions depend
-/// on snapshots only; only pause() is given the time. Not for the RT path; not thread-safe.
+/// The common part of the guided acquisitions of all methods with a touch probe: the touches of the
+/// run, notes on them, and the conditions that end a run of any method. Decisions depend on
+/// snapshots only; only pause() receives the time. Not for the RT path; not thread-safe.
 
 #include <array>
 #include <chrono>
@@ -32,22 +32,24 @@ class TouchIntake {
  public:
   explicit TouchIntake(TouchRules rules = {}) : rules_(std::move(rules)) {}
 
-  /// Touches before `from` are not of the run.
+  /// Starts the run. Touches before `from` do not belong to it.
   void begin(protocol::HostTime from) noexcept { from_ = last_touch_ = from; }
-  /// True for a touch of the run.
+  /// True if the touch belongs to the run.
   [[nodiscard]] bool is_of_run(const protocol::Snapshot& snapshot) noexcept;
 
-  /// Why the run ends with this touch: its device restarted. Empty: it does not.
+  /// The reason why the run ends with this touch: its device has restarted. Empty: the run
+  /// continues.
   [[nodiscard]] std::string lost_zero(const protocol::Snapshot& touch) const;
-  /// Notes an unusable touch. Returns why a run without a usable touch ends; empty: it does not.
+  /// Notes an unusable touch. If the run has no usable touch so far, returns the reason why it
+  /// ends. Empty: the run continues.
   [[nodiscard]] std::string refuse(const protocol::Snapshot& touch, std::string_view fault,
                                    std::string_view expected);
   void usable(const protocol::Snapshot& touch) noexcept;
-  /// Times of the first and the last usable touch; nullopt without one.
+  /// Host times of the first and the last usable touch; nullopt if there is none.
   [[nodiscard]] const std::optional<std::array<protocol::HostTime, 2>>& observed() const noexcept {
     return observed_;
   }
-  /// Why the run ends at `now`: no touch for too long; empty: it does not.
+  /// The reason why the run ends at `now`: no touch for too long. Empty: the run continues.
   [[nodiscard]] std::string pause(protocol::HostTime now) const;
 
   void note(const protocol::Snapshot& touch, std::string_view what);

@@ -41,8 +41,8 @@ struct ModelStatistics {
   ResidualFigures before, after;
   int iterations = 0;
   std::string stop_reason;
-  /// Observations less the unknowns that they determine; one with a prior counts in part. nullopt:
-  /// not known, as in models of earlier versions.
+  /// Degrees of freedom: number of observations minus the number of unknowns that they determine.
+  /// An unknown with a prior counts in part. nullopt: not known, as in models of earlier versions.
   std::optional<double> degrees_of_freedom{};
   friend bool operator==(const ModelStatistics&, const ModelStatistics&) = default;
 };
@@ -50,20 +50,20 @@ struct ModelStatistics {
 /// Drift of the tracker estimated with reference nests (calib/otf/samples/tracker_drift.hpp).
 struct TrackerDriftFigures {
   calib::Vector3 largest_m = calib::Vector3::Zero();  ///< machine axes, at the centre of the path
-  double u_repeatability_m = 0.0;                     ///< of a visit of a nest, as used
+  double u_repeatability_m = 0.0;  ///< standard uncertainty of a visit of a nest, as used
   std::size_t visits = 0;
   friend bool operator==(const TrackerDriftFigures&, const TrackerDriftFigures&) = default;
 };
 
-/// What an identification with a Multi-Feature Bar found besides the errors, in the terms of its
-/// files: features from 1, touches of a feature from 0.
+/// Results of an identification with a Multi-Feature Bar other than the errors, with the names of
+/// its files. Features are counted from 1, touches of a feature from 0.
 struct BarFigures {
   struct Pass {
     std::string measurement;
     double chi2_per_dof = 0.0;
     friend bool operator==(const Pass&, const Pass&) = default;
   };
-  /// Drift of the machine during one pass, machine axes, from a pair of passes.
+  /// Drift of the machine during one pass, in machine axes, from a forward and a backward pass.
   struct Drift {
     std::string forward, backward;  ///< names of the measurements
     calib::Vector3 rate_m = calib::Vector3::Zero(), u_rate_m = calib::Vector3::Zero();
@@ -72,7 +72,7 @@ struct BarFigures {
   struct SetAside {
     std::string measurement, feature, side;  ///< side: empty for holes and rods
     std::size_t index = 0, k = 0;
-    double residual_m = 0.0;  ///< from the other touches of the feature, along the normal
+    double residual_m = 0.0;  ///< deviation from the other touches of the feature, along the normal
     friend bool operator==(const SetAside&, const SetAside&) = default;
   };
   std::vector<Pass> passes;
@@ -98,33 +98,35 @@ struct ModelDocument {
   /// recording was switched off. A gap does not affect the uncertainty of the model, but no replay
   /// can check such a model.
   std::string recording_gap{};
-  /// Of method otf: "on-the-fly" or "standstill". Empty for other methods and in files of earlier
+  /// Method otf only: "on-the-fly" or "standstill". Empty for other methods and in files of earlier
   /// versions.
   std::string mode{};
-  /// Of method otf with backlash: the differences that the run determined, for people. All of them
-  /// are in model.travel(), on which V depends; models of earlier versions have only this list. It
-  /// is not in the hash.
+  /// Method otf with backlash only: the differences between the directions of travel that the run
+  /// determined, for display. model.travel(), on which V depends, contains all of them; models of
+  /// earlier versions have only this list. Not in the hash.
   std::vector<calib::Backlash> backlash{};
-  /// Of method otf with reference nests. Not in the hash, as other statistics.
+  /// Method otf with reference nests only. Not in the hash, like other statistics.
   std::optional<TrackerDriftFigures> tracker_drift{};
-  /// Of method mfb. Not in the hash, as other statistics.
+  /// Method mfb only. Not in the hash, like other statistics.
   std::optional<BarFigures> bar{};
-  /// Not in the hash, as other statistics. Absent in models of earlier versions.
+  /// Figures of the run. Not in the hash, like other statistics. Absent in models of earlier
+  /// versions.
   std::optional<RunFigures> run{};
   /// Version of abbe that identified the model; empty: this one. Not in the hash.
   std::string software{};
   /// Decision on the model; nullopt: not judged, as in files of earlier versions. Not in the hash.
   std::optional<ModelVerdict> verdict{};
-  /// Of the configuration; machine_hash is the hash of its readings. nullopt: a file of an earlier
-  /// version, whose machine_hash is a former_machine_hash(). Not in the hash of the model.
+  /// Meaning of the configuration; machine_hash is the hash of its readings. nullopt: the file is
+  /// from an earlier version, and machine_hash is a former_machine_hash(). Not in the hash of the
+  /// model.
   std::optional<Meaning> configuration{};
-  /// Of method otf with a named place of the tracker, for updates. In the hash, if present.
+  /// Method otf with a named place of the tracker only, for updates. In the hash if present.
   std::optional<calib::TrackerPlace> tracker_place{};
 };
-/// Whether the devices that gave the data of the model were simulated; nullopt: not known, as in
-/// files of earlier versions.
+/// True if the devices that measured the data of the model were simulated; nullopt: not known, as
+/// in files of earlier versions.
 [[nodiscard]] std::optional<bool> made_on_simulated_devices(const ModelDocument& document);
-/// For people: what is stated of the devices.
+/// Text for people: whether the devices were simulated.
 [[nodiscard]] std::string_view devices_in_words(std::optional<bool> simulated);
 
 /// Text for the verdict on a model whose recording has this gap.
@@ -154,7 +156,7 @@ struct ModelDocument {
 /// for a polynomial model.
 [[nodiscard]] std::string to_coefficients_csv(const calib::PolynomialModel& model);
 
-/// All: the numbers read back to the same bits. Six: six significant digits, for people.
+/// All: so many digits that reading gives the same bits. Six: six significant digits, for people.
 enum class Digits { All, Six };
 
 /// CSV with the columns `name,position_mm,value,u,unit`: tables and squareness, then backlash

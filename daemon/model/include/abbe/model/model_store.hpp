@@ -3,7 +3,7 @@
 ///
 ///   models/ID.json   one model.json each, never changed after it was written
 ///   state.json       all events in order (added, activated, rolled back), replaced as a whole
-///   index.sqlite     what lists need of each model.json; made again if it is missing or damaged
+///   index.sqlite what lists need of each model.json; rebuilt if it is missing or damaged
 ///
 /// A write creates a temporary file, syncs it to the disk and renames it: after a power failure the
 /// store has either the old or the new state. Several processes may use a store; a lock file orders
@@ -43,13 +43,14 @@ struct StoreEvent {
 struct StoreEntry {
   std::string id;
   bool active = false;
-  /// False: neither the store nor the file has a verdict.
+  /// False if neither the store nor the file has a verdict.
   bool judged = false;
-  bool accepted = false;  ///< verdict of the gate when it was added, else that of the file
+  /// verdict of the gate when the model was added, else the verdict in the file
+  bool accepted = false;
   std::vector<std::string> reasons;
   protocol::UtcTime added{};
   std::string method, machine;      ///< empty if the file cannot be read
-  std::vector<std::string> inputs;  ///< names of the files that the model was made of
+  std::vector<std::string> inputs;  ///< names of the files from which the model was made
   std::string fault;                ///< why the file cannot be read; empty: readable
   std::optional<bool> simulated{};  ///< made_on_simulated_devices()
 };
@@ -69,7 +70,7 @@ class ModelStore {
   /// state.json is damaged (the models are not changed).
   [[nodiscard]] static Result<ModelStore> open(const std::filesystem::path& folder);
 
-  /// Does not access the disk: for abbed, which continues to run while the store is not available.
+  /// Does not access the disk. For abbed, which also runs while the store is not available.
   explicit ModelStore(std::filesystem::path folder);
   /// Creates the folder if it does not exist.
   [[nodiscard]] Result<void> create() const;
@@ -82,7 +83,7 @@ class ModelStore {
   /// that no model is active and the stored models have the verdict of their files. Takes the lock
   /// of the store.
   [[nodiscard]] Result<void> rename_damaged_state(protocol::UtcTime now);
-  /// The newest name of a state.json.damaged-DATE; empty: there is none.
+  /// The newest file name of the form state.json.damaged-DATE; empty: there is none.
   [[nodiscard]] std::string damaged_state() const;
   /// Removes temporary files (NAME.PID.new) of processes that no longer exist; failures are
   /// ignored. Call it at the start of the process, before the first write, because files with the
@@ -96,8 +97,8 @@ class ModelStore {
                                         std::vector<std::string> reasons, const StoreActor& actor);
 
   /// Makes a model active. Refused if the gate did not accept the model, unless `force`; an Error
-  /// if the model file is missing or damaged. The verdict is that of the store; where its state was
-  /// lost, that of the file. `accepted_configuration`: StoreEvent.
+  /// if the model file is missing or damaged. The verdict is that of the store, or that of the file
+  /// if the state of the store was lost. `accepted_configuration`: see StoreEvent.
   [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor,
                                       bool force = false, std::string accepted_configuration = {});
 
@@ -105,9 +106,9 @@ class ModelStore {
   /// if another model is active, or if the same event is recorded already.
   [[nodiscard]] Result<void> add_drift(const std::string& id, const StoreActor& actor);
 
-  /// Activates the model that was active before `active`; returns its id. Refused if another model
-  /// than `active` is active: a request that is repeated because its answer was lost must not go
-  /// one model further back. Refused if no model was active before.
+  /// Activates the model that was active before `active`; returns its id. Refused if a model other
+  /// than `active` is active: if a client repeats a request because the answer was lost, the
+  /// repetition must not go back by another model. Refused if no model was active before.
   [[nodiscard]] Result<std::string> rollback(const StoreActor& actor, const std::string& active);
 
   /// Removes the models that `retention` does not keep; returns their ids, oldest first. The active

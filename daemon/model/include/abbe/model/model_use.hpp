@@ -1,8 +1,7 @@
 #pragma once
-/// What stands against the use of a model, and what its user must know. Everything that lets a
-/// model leave abbe (control files, certificates, reports, the page, Python) asks here, so that a
-/// state that one part knows is not lost in the next. A new obstacle is added in obstacles_to_use()
-/// only. Pure.
+/// States the reasons against the use of a model, and what its user must know. All code that passes
+/// a model on (control files, certificates, reports, the page, Python) calls these functions, so
+/// that all of it applies the same reasons. A new reason is added in obstacles_to_use() only. Pure.
 
 #include <optional>
 #include <span>
@@ -13,12 +12,13 @@
 
 namespace abbe::daemon {
 
-/// Control: the model corrects a machine from now on. Certificate: it states how the machine was
-/// when it was measured. Look: reports and figures, which show everything and refuse nothing: all
-/// of it is in Obstacles::statements, the verdict first.
+/// The purpose for which a model is used. Control: the model corrects a machine from now on.
+/// Certificate: a document states how the machine was when it was measured. Look: reports and
+/// figures. For Look nothing is refused: all reasons are in Obstacles::statements, the verdict
+/// first.
 enum class ModelPurpose { Control, Certificate, Look };
 
-/// A model with what is known beside its document.
+/// A model, with information that its document does not contain.
 struct ModelInUse {
   const ModelDocument& document;         ///< with the verdict of its file or store
   std::span<const StoreEvent> events{};  ///< of this model, oldest first; empty: it is in no store
@@ -26,25 +26,25 @@ struct ModelInUse {
   /// known.
   std::optional<std::string> machine_hash{};
   ModelPurpose purpose = ModelPurpose::Control;
-  /// identity_doubt() of the store of the model; empty: there is none, or no identity is known.
+  /// identity_doubt() of the store of the model; empty: nothing speaks against the model, or no
+  /// identity is known.
   std::string identity_doubt{};
 };
 
-/// True if the model was made for another configuration than that of `machine_hash`, and nobody
-/// accepted it for this one. False if the configuration is not known.
+/// True if the model was made for another configuration than that of `machine_hash`, and no person
+/// has accepted it for this one. False if the configuration is not known.
 [[nodiscard]] bool is_of_another_machine(const ModelInUse& use);
 
 /// Sentences without full stop; none has a line break or a control character.
 struct Obstacles {
   std::vector<std::string> refusals;    ///< the model must not be used, unless a person forces it
-  std::vector<std::string> statements;  ///< belong into each file that is made of the model
+  std::vector<std::string> statements;  ///< must be written into each file made from the model
 };
 [[nodiscard]] Obstacles obstacles_to_use(const ModelInUse& use);
 
-/// What a file that is made of the model states: the refusals, with who forced the use and why,
-/// then the statements. Refused with all refusals if there are any and `forced` is empty; `what`
-/// was tried:
-/// "export model.json".
+/// The statements that a file made from the model must contain: the refusals, with who forced the
+/// use and why, then the statements. If there are refusals and `forced` is empty, the result is an
+/// Error Refused with all of them. `what` is the attempted action, "export model.json".
 [[nodiscard]] Result<std::vector<std::string>> statements_of_use(
     const std::string& what, const Obstacles& obstacles, const std::optional<StoreActor>& forced);
 

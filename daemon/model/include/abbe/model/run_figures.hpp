@@ -1,8 +1,7 @@
 #pragma once
-/// What a run left when its model was identified, for the report. It is in model.json, so that the
-/// report can be made again at any time, and not in the hash of the model. Every part may be
-/// absent:
-/// models of earlier versions have less.
+/// Figures of the run from which a model was identified, for the report. They are stored in
+/// model.json, so that the report can be made again at any time; the hash of the model does not
+/// cover them. Every part may be absent, because models of earlier versions have fewer parts.
 
 #include <array>
 #include <cstddef>
@@ -15,28 +14,30 @@
 
 namespace abbe::daemon {
 
-/// Residuals of the fit in the order of the run. Of more than kMostPoints the smallest and the
-/// largest of each interval are kept.
+/// Residuals of the fit in the order of the run. A series of more than kMostPoints residuals is
+/// divided into intervals, of which the smallest and the largest residual are kept.
 struct ResidualSeries {
   static constexpr std::size_t kMostPoints = 2000;
   struct Point {
-    double at = 0.0;  ///< s from the beginning of the run, or number of the residual, from 1
+    /// s from the beginning of the run, or the number of the residual, counted from 1
+    double at = 0.0;
     double after_m = 0.0;
     friend bool operator==(const Point&, const Point&) = default;
   };
-  std::size_t count = 0;  ///< of all residuals
+  std::size_t count = 0;  ///< number of all residuals
   bool over_time = false;
   std::vector<Point> points;
   friend bool operator==(const ResidualSeries&, const ResidualSeries&) = default;
 };
 
 struct RunConditions {
-  std::optional<std::array<double, 2>> temperature_K{};  ///< lowest and highest of the run
+  /// lowest and highest temperature during the run
+  std::optional<std::array<double, 2>> temperature_K{};
   /// Lowest and highest temperature of a bar, as used in its measurements.
   std::optional<std::array<double, 2>> bar_temperature_K{};
   std::optional<double> duration_s{};
-  std::optional<double> feed_m_per_s{};  ///< median over the legs
-  /// First and last observation; nullopt: the observations have no date, as in files.
+  std::optional<double> feed_m_per_s{};  ///< feed, median over the legs
+  /// Dates of the first and last observation; nullopt: the observations have no date, as in files.
   std::optional<std::array<protocol::UtcTime, 2>> measured{};
   friend bool operator==(const RunConditions&, const RunConditions&) = default;
 };
@@ -44,16 +45,16 @@ struct RunConditions {
 struct RunFigures {
   using Series = ResidualSeries;
   using Conditions = RunConditions;
-  /// rms of the residuals in one interval of the run, in its order.
+  /// rms of the residuals in one interval of the path.
   struct Interval {
-    double at_m = 0.0;  ///< middle of the interval, length of the path from its beginning
+    double at_m = 0.0;  ///< path length from the beginning to the middle of the interval
     double before_m = 0.0, after_m = 0.0;
     friend bool operator==(const Interval&, const Interval&) = default;
   };
   /// Residuals of one part of the run: a leg, a position of the artefact, a measurement.
   struct Part {
     std::string name;
-    std::size_t count = 0;  ///< of residuals; a vector counts as three
+    std::size_t count = 0;  ///< number of residuals; a vector counts as three
     double before_rms_m = 0.0, after_rms_m = 0.0, after_max_m = 0.0;  ///< max: of absolute values
     /// First and last time, from the beginning of the run; nullopt: there are no times.
     std::optional<std::array<double, 2>> time_s{};
@@ -61,12 +62,13 @@ struct RunFigures {
   };
   /// rms of observations to which the model was not fitted, in one cell of the map of the volume.
   struct HeldOutCell {
-    std::size_t slab = 0, cell = 0;  ///< report/model_figures.hpp
+    /// numbers of the slab and of the cell in it, see report/model_figures.hpp
+    std::size_t slab = 0, cell = 0;
     std::size_t count = 0;
     double before_m = 0.0, after_m = 0.0, sigma_m = 0.0;
     friend bool operator==(const HeldOutCell&, const HeldOutCell&) = default;
   };
-  /// What only one method knows, as text for people.
+  /// A table that only one method has, as text for people.
   struct Table {
     std::string title, explanation;
     std::vector<std::string> columns;
@@ -80,21 +82,21 @@ struct RunFigures {
 
   std::string held_out;  ///< what was excluded from the fit: "legs", "positions", "points"
   double held_out_before_m = 0.0, held_out_after_m = 0.0;  ///< rms
-  /// Of the verdict, in models of earlier versions; see ModelVerdict::notes.
+  /// Notes of the verdict, only in models of earlier versions; else see ModelVerdict::notes.
   std::vector<std::string> notes;
-  std::vector<Interval> residuals;  ///< of a run along a path, else empty
-  /// Where was measured, polylines of scale readings: the driven path of each run, the balls of
+  std::vector<Interval> residuals;  ///< for a run along a path, else empty
+  /// Where the run measured, as polylines of scale readings: the path of each run, the balls of
   /// each position of an array, the bar in each of its positions.
   std::vector<std::vector<calib::Vector3>> places_m{};
   std::string part_kind{};  ///< "leg", "position", "measurement"
   std::vector<Part> parts{};
   std::optional<Series> series{};
-  std::vector<std::size_t> sigma_counts{};  ///< kSigmaIntervals of them, or none
+  std::vector<std::size_t> sigma_counts{};  ///< kSigmaIntervals elements, or none
   std::vector<HeldOutCell> held_out_cells{};
   std::vector<Table> tables{};
   std::optional<Conditions> conditions{};
-  /// Id of the model that was fitted to the run, if it is not this one but was only used to update
-  /// it: residuals, held-out test and statistics are those of that model.
+  /// Set if the model fitted to the run was only used to update this model: the id of the fitted
+  /// model. Residuals, held-out test and statistics are then those of the fitted model.
   std::string of_model{};
   friend bool operator==(const RunFigures&, const RunFigures&) = default;
 };

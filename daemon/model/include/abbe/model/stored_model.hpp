@@ -1,5 +1,6 @@
 #pragma once
-/// A model as its store knows it: the document with the verdict of the store, and its events.
+/// A model as the store returns it: the document with the verdict of the store, and the events of
+/// the model.
 
 #include <string>
 #include <vector>
@@ -9,12 +10,12 @@
 namespace abbe::daemon {
 
 struct StoredModel {
-  /// Its verdict is that of the last time the model was added, with a forced activation: the file
-  /// in the store is not changed by later events. Without an entry of the store (its state was
-  /// damaged) it is the verdict of the file.
+  /// The verdict in the document is that of the last time the model was added; a forced activation
+  /// is included, although later events do not change the file in the store. If the store has no
+  /// entry for the model (its state was damaged), it is the verdict of the file.
   ModelDocument document;
   StoreEntry entry;
-  std::vector<StoreEvent> events;  ///< of this model, oldest first
+  std::vector<StoreEvent> events;  ///< events of this model, oldest first
 };
 
 /// Reads one model and the state of the store.

@@ -17,24 +17,24 @@
 namespace abbe::mtconnect {
 
 struct ShdrServerOptions {
-  std::string address = "127.0.0.1";  ///< numeric
+  std::string address = "127.0.0.1";  ///< numeric IP address
   std::uint16_t port = 7878;          ///< 0: any free port
   std::chrono::milliseconds heartbeat = std::chrono::seconds{10};
   /// At the limit a further client replaces the oldest one that never sent "* PING", which is not
   /// an agent; if there is none, the further client is refused.
   std::size_t clients = 16;
-  /// A client with more bytes waiting for it is disconnected, also one that has read nothing for
-  /// two heartbeats while bytes wait.
+  /// A client is disconnected if more than this number of bytes wait for it, or if it has read
+  /// nothing for two heartbeats while bytes wait.
   std::size_t unsent_bytes = 256u << 10;
   int socket_buffer_bytes = 64 << 10;  ///< of the kernel, for each client
-  /// Bytes of a client in one second. An agent sends 7 in each heartbeat.
+  /// Most bytes that a client may send in one second. An agent sends 7 in each heartbeat.
   std::size_t received_bytes_per_s = 16u << 10;
 };
 
 class ShdrServer {
  public:
   using Log = std::function<void(std::string_view line)>;
-  /// The lines for a client that has just connected.
+  /// Returns the lines for a client that has just connected.
   using Greeting = std::function<std::string()>;
   using Clock = std::chrono::steady_clock;
 
@@ -54,13 +54,14 @@ class ShdrServer {
  private:
   struct Client {
     daemon::FileDescriptor fd;
-    std::string name;                ///< "127.0.0.1:40312"
-    Clock::time_point progress;      ///< of sending: nothing waited, or bytes were accepted
-    Clock::time_point last_ping{};   ///< zero: never
-    Clock::time_point second_began;  ///< of `received`
+    std::string name;  ///< "127.0.0.1:40312"
+    /// last time at which no bytes waited for the client, or the client accepted bytes
+    Clock::time_point progress;
+    Clock::time_point last_ping{};   ///< zero: no ping yet
+    Clock::time_point second_began;  ///< start of the second in which `received` counts
     std::size_t received = 0;        ///< bytes in this second
     std::string inbox{}, outbox{};
-    std::string fault{};  ///< why it is to be disconnected; empty: it stays
+    std::string fault{};  ///< why the client must be disconnected; empty: it stays connected
   };
 
   ShdrServer(ShdrServerOptions options, Greeting greeting, Log log, daemon::FileDescriptor listener,

@@ -20,11 +20,13 @@ inline constexpr std::size_t kLongestText = 1000;
 ///   "?".
 /// - A text with "|", or with a quotation mark at its beginning, is enclosed in quotation marks,
 ///   with a backslash before "|", quotation marks and backslashes.
-/// - So is a text with "--multiline--", with a backslash after its first character: with this word
-///   in a line the agent would wait for a document in several lines and show nothing that follows.
+/// - A text with "--multiline--" is enclosed as well, and gets a backslash after its first
+///   character. Otherwise the agent would wait for a document in several lines and show nothing
+///   that follows.
 [[nodiscard]] std::string shdr_field(std::string_view text);
 
-/// A native code. The agent takes a part behind ":" for the condition's id, so ":" becomes "_".
+/// Makes a native code. ":" becomes "_", because the agent would use the part after ":" as the
+/// condition's id.
 [[nodiscard]] std::string shdr_code(std::string_view code);
 
 /// UTC with microseconds, the resolution of an agent: "2024-05-17T08:30:00.123456Z".

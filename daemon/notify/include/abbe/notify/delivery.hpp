@@ -1,6 +1,6 @@
 #pragma once
-/// Sends notifications to one receiver, on a thread of its own: a receiver that hangs delays no
-/// other. Thread-safe.
+/// Sends notifications to one receiver on a separate thread, so that a receiver that does not
+/// answer delays no other. Thread-safe.
 
 #include <condition_variable>
 #include <functional>
@@ -23,13 +23,14 @@ struct DeliveryOptions {
 
 class Delivery {
  public:
-  /// Called by the thread of this receiver.
+  /// The log function. It is called on the thread of this receiver.
   using Log = std::function<void(std::string_view line)>;
 
   Delivery(Receiver receiver, DeliveryOptions options, Log log);
   Delivery(const Delivery&) = delete;
   Delivery& operator=(const Delivery&) = delete;
-  /// Ends at once, also while the receiver hangs; logs what was not delivered.
+  /// Returns at once, also while a receiver does not answer. Logs the notifications that were not
+  /// delivered.
   ~Delivery();
 
   void push(Notification notification);  ///< never waits for the receiver

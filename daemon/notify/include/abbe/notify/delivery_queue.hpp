@@ -1,7 +1,7 @@
 #pragma once
-/// The notifications that wait for one receiver. A receiver that is down is tried again with
-/// growing pauses; what does not fit is dropped, the oldest first, and counted.
-/// Not thread-safe; reads no clock.
+/// The notifications that wait for one receiver. If the receiver cannot be reached, sending is
+/// tried again after pauses of growing length. When the queue is full, the oldest notifications are
+/// dropped and counted. Not thread-safe; reads no clock.
 
 #include <chrono>
 #include <cstddef>
@@ -15,7 +15,8 @@ namespace abbe::notify {
 
 struct DeliveryPauses {
   std::chrono::milliseconds first = std::chrono::seconds{5};
-  std::chrono::milliseconds longest = std::chrono::minutes{10};  ///< each pause is twice the last
+  /// longest pause; each pause is twice as long as the one before
+  std::chrono::milliseconds longest = std::chrono::minutes{10};
 };
 
 class DeliveryQueue {
@@ -33,14 +34,16 @@ class DeliveryQueue {
     Notification notification;
     std::uint64_t not_delivered = 0;
   };
-  /// nullopt: nothing waits, or a pause has not ended. One of the three functions below follows.
+  /// The next notification to send; nullopt: none waits, or a pause has not ended. After each
+  /// take() that returns a value, call one of the three functions below.
   [[nodiscard]] std::optional<Attempt> take(Time now);
   void accepted();
-  void refused();  ///< by the receiver, for good: lost
-  /// The receiver is down: it is sent again after the pause, which is returned.
+  void refused();  ///< the receiver refused the notification finally; it is lost
+  /// The receiver cannot be reached. The notification is sent again after a pause, which is
+  /// returned.
   std::chrono::milliseconds failed(Time now);
 
-  /// When take() has something; nullopt: not before the next push().
+  /// Time at which take() will return a value; nullopt: not before the next push().
   [[nodiscard]] std::optional<Time> next() const;
   [[nodiscard]] std::size_t waiting() const noexcept { return waiting_.size(); }
   [[nodiscard]] std::uint64_t not_delivered() const noexcept { return lost_; }

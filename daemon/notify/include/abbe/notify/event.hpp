@@ -1,5 +1,5 @@
 #pragma once
-/// A change of state that a person wants to know.
+/// A change of state that is reported to people.
 
 #include <chrono>
 #include <cstdint>
@@ -15,7 +15,7 @@ using daemon::NotifyKind;
 
 enum class Severity { Info, Warning, Fault };
 
-/// Of a state that lasts: Begins, Ends. Happened: anything else.
+/// Begins, Ends: the begin or end of a state that lasts. Happened: any other event.
 enum class Phase { Happened, Begins, Ends };
 
 [[nodiscard]] std::string_view name_of(Severity severity) noexcept;  ///< "info", "warning", "fault"
@@ -25,12 +25,12 @@ struct Event {
   NotifyKind kind = NotifyKind::NotReachable;
   Phase phase = Phase::Happened;
   Severity severity = Severity::Info;
-  std::string subject{};      ///< what it is about: a device, "model", "calibration 3"
-  std::string text{};         ///< as status and page show it
-  std::string model_id{};     ///< empty: no model is meant
+  std::string subject{};      ///< what the event is about: a device, "model", "calibration 3"
+  std::string text{};         ///< the text that status and page also show
+  std::string model_id{};     ///< empty: the event concerns no model
   std::uint64_t session = 0;  ///< number of the calibration; 0: none
   bool simulated = false;     ///< the devices are simulated
-  protocol::UtcTime time{};   ///< when it was seen
+  protocol::UtcTime time{};   ///< time at which the event was detected
 };
 
 /// The present time, read by the caller.

@@ -1,7 +1,8 @@
 #pragma once
-/// At most one notification of each kind in a minute. Events in between are held back and sent
-/// together, with the number of changes; of each subject with its latest text. So a device that
-/// comes and goes every second gives one notification a minute. Not thread-safe; reads no clock.
+/// Limits notifications to one of each kind per minute. Events within the minute are held back and
+/// sent together: for each subject its latest text, and the number of changes. A device that
+/// connects and disconnects every second thus causes one notification a minute. Not thread-safe;
+/// reads no clock.
 
 #include <chrono>
 #include <cstdint>
@@ -18,21 +19,21 @@ namespace abbe::notify {
 class EventLimit {
  public:
   static constexpr std::chrono::seconds kPeriod{60};
-  static constexpr std::size_t kMostHeld = 20;  ///< subjects in one notification
+  static constexpr std::size_t kMostHeld = 20;  ///< most subjects in one notification
 
-  /// Events of other kinds than `wanted` are ignored. `run` is part of every id and differs from
-  /// run to run of the process.
+  /// Events whose kind is not in `wanted` are ignored. `run` is part of every id and is different
+  /// each time the process starts.
   EventLimit(std::string machine, std::vector<daemon::NotifyKind> wanted, std::string run)
       : machine_(std::move(machine)), wanted_(std::move(wanted)), run_(std::move(run)) {}
 
   void add(const Event& event);
-  /// What is to be sent now.
+  /// The notifications that must be sent now.
   [[nodiscard]] std::vector<Notification> due(std::chrono::steady_clock::time_point now);
 
  private:
   struct Held {
     std::optional<std::chrono::steady_clock::time_point> sent;
-    std::vector<Event> events;  ///< one of each subject
+    std::vector<Event> events;  ///< one event for each subject
     std::uint64_t changes = 0;
   };
 
@@ -45,10 +46,10 @@ class EventLimit {
   std::map<daemon::NotifyKind, Held> held_;
 };
 
-/// A text that differs from run to run: 16 hexadecimal digits.
+/// A random text, different each time the process starts: 16 hexadecimal digits.
 [[nodiscard]] std::string random_run();
 
-/// The notification of `abbe-notify --test`.
+/// The notification that `abbe-notify --test` sends.
 [[nodiscard]] Notification test_notification(const std::string& machine, protocol::UtcTime now);
 
 }  // namespace abbe::notify

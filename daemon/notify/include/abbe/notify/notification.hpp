@@ -1,6 +1,6 @@
 #pragma once
-/// What is sent: one or more events of a kind, as JSON for a webhook and as a mail.
-/// Pure, thread-safe; allocates.
+/// A notification: one or more events of a kind, as JSON for a webhook and as a mail. Pure,
+/// thread-safe; allocates.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,23 +13,24 @@
 namespace abbe::notify {
 
 struct Notification {
-  /// The same in every attempt to deliver it, so that a receiver can recognise a repetition.
+  /// Id of the notification. It is the same in every attempt to deliver it, so that a receiver can
+  /// recognise a repetition.
   std::string id{};
   std::string machine{};
-  std::string kind{};  ///< a word of `events`, or "test"
+  std::string kind{};  ///< a word of the key `events`, or "test"
   Phase phase = Phase::Happened;
   Severity severity = Severity::Info;
   std::string text{};  ///< one line
   std::vector<std::string> subjects{};
   std::string model_id{};
   std::uint64_t session = 0;
-  std::uint64_t changes = 1;  ///< how many changes of state it stands for
+  std::uint64_t changes = 1;  ///< number of changes of state that the notification summarises
   bool simulated = false;
-  protocol::UtcTime time{};  ///< of the latest change
+  protocol::UtcTime time{};  ///< time of the latest change
 };
 
 /// "FAULT mill 7: tracker: connecting; last fault: ...", for receivers that show one text.
-/// `not_delivered`: notifications before this one that were lost.
+/// `not_delivered`: number of notifications lost before this one.
 [[nodiscard]] std::string headline(const Notification& notification, std::uint64_t not_delivered);
 
 /// The JSON object of docs/files.md, "Notification of a webhook".
@@ -45,8 +46,9 @@ struct MailAddresses {
 [[nodiscard]] std::string mail_of(const Notification& notification, std::uint64_t not_delivered,
                                   const MailAddresses& addresses);
 
-/// `text` as the value of a header: as it is if it is short printable ASCII, else as encoded words
-/// [RFC 2047] of at most 75 characters, on lines of their own. Control characters become spaces.
+/// Makes the value of a mail header from `text`. Short printable ASCII is used as it is; other text
+/// is written as encoded words [RFC 2047] of at most 75 characters, one per line. Control
+/// characters become spaces.
 [[nodiscard]] std::string header_text(std::string_view text);
 
 }  // namespace abbe::notify

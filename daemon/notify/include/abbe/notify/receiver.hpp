@@ -1,7 +1,7 @@
 #pragma once
-/// Whom notifications are sent to: a webhook, or one recipient of mails. Each recipient is a
-/// receiver of its own, so that one address that a server refuses does not keep the mail from the
-/// others. With the secrets of the files that the configuration names.
+/// The receivers of notifications: webhooks and recipients of mails. Each recipient is a separate
+/// receiver, so that an address that a mail server refuses does not prevent the mail to the others.
+/// A receiver contains the secrets from the files that the configuration names.
 
 #include <filesystem>
 #include <string>
@@ -24,11 +24,11 @@ struct Mailbox {
   std::string user, password;
   std::string from;
   std::string recipient;
-  std::vector<std::string> all_recipients;  ///< header To
+  std::vector<std::string> all_recipients;  ///< for the header To
 };
 
 struct Receiver {
-  std::string name;  ///< for people, without secrets: "webhook 1 (https://hooks.example.com)"
+  std::string name;  ///< name in messages, without secrets: "webhook 1 (https://hooks.example.com)"
   std::variant<Webhook, Mailbox> way;
   std::filesystem::path ca_file;
 };

@@ -1,8 +1,8 @@
 #pragma once
-/// The events in a sequence of answers of abbed to "status". Each change is reported once, also if
-/// abbed did not answer in between. What is wrong when the first answer arrives is reported once;
-/// what else that answer contains is the state from which changes are counted.
-/// Not thread-safe; reads no clock.
+/// Finds the events in a sequence of answers of abbed to "status". Each change is reported once,
+/// also if abbed did not answer in between. Faults in the first answer are reported once. Other
+/// states in the first answer are not reported: changes are counted from them. Not thread-safe;
+/// reads no clock.
 
 #include <chrono>
 #include <map>
@@ -18,9 +18,9 @@ namespace abbe::notify {
 
 class StateChanges {
  public:
-  /// `settle`: the time after the first answer of an abbed during which its devices connect; what
-  /// is wrong is reported if it is still wrong afterwards. Also the time without an answer after
-  /// which abbed is not reachable.
+  /// `settle`: time after the first answer of an abbed in which its devices connect. Faults are
+  /// reported only if they are still present afterwards. The same time without an answer means that
+  /// abbed is not reachable.
   explicit StateChanges(std::chrono::nanoseconds settle) : settle_(settle) {}
 
   [[nodiscard]] std::vector<Event> take(const daemon::DaemonPoll::Answer& answer, Moment now);
@@ -32,7 +32,8 @@ class StateChanges {
   struct Lasting {
     NotifyKind kind = NotifyKind::DeviceLost;
     Severity severity = Severity::Warning;
-    std::string state{};  ///< another state is reported again, another text is not
+    /// a change of this member is reported again; a change of the text is not
+    std::string state{};
     std::string text{};
     std::string model_id{};
   };
@@ -47,12 +48,12 @@ class StateChanges {
   [[nodiscard]] AllLasting lasting_in(const nlohmann::json& status);
 
   std::chrono::nanoseconds settle_;
-  std::optional<int> process_;      ///< of the abbed that answered last
-  bool first_answer_ = true;        ///< of this StateChanges
-  std::uint64_t last_session_ = 0;  ///< the highest number of a calibration that has ended
+  std::optional<int> process_;  ///< process id of the abbed that answered last
+  bool first_answer_ = true;    ///< true: no answer has been evaluated since this object was made
+  std::uint64_t last_session_ = 0;  ///< highest number of a calibration that has ended
   std::string demand_, release_;    ///< what a person was last asked to do
   bool had_model_ = false;
-  AllLasting lasting_;  ///< as reported
+  AllLasting lasting_;  ///< states that were reported
   Steady settled_at_{};
   std::optional<Steady> away_since_;
   bool away_reported_ = false;

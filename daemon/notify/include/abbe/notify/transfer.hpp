@@ -1,6 +1,6 @@
 #pragma once
 /// One attempt to send a notification, with libcurl. TLS certificates are always verified, a
-/// redirect is not followed, and only http, https, smtp and smtps are spoken.
+/// redirect is not followed, and only the protocols http, https, smtp and smtps are used.
 
 #include <atomic>
 #include <chrono>
@@ -15,21 +15,22 @@ namespace abbe::notify {
 
 struct TransferLimits {
   std::chrono::milliseconds connect = std::chrono::seconds{10};
-  /// The whole attempt. Some mail servers wait half a minute before they greet.
+  /// Time limit for the whole attempt. Some mail servers wait half a minute before they send a
+  /// greeting.
   std::chrono::milliseconds whole = std::chrono::seconds{60};
 };
 
 struct TransferOutcome {
   enum class Kind {
     Accepted,
-    Refused,  ///< for good: HTTP 3xx and 4xx, SMTP 5xx
-    Failed,   ///< may succeed later
+    Refused,  ///< final refusal: HTTP 3xx and 4xx, SMTP 5xx
+    Failed,   ///< another attempt may succeed
   };
   Kind kind = Kind::Failed;
-  std::string text;  ///< what was seen: "HTTP 500: ..."
+  std::string text;  ///< the answer or fault that was observed: "HTTP 500: ..."
 };
 
-/// send() is for one thread; stop() for any.
+/// send() must be called by one thread only; stop() may be called by any.
 class Transfer {
  public:
   explicit Transfer(TransferLimits limits = {});
@@ -39,7 +40,7 @@ class Transfer {
 
   [[nodiscard]] TransferOutcome send(const Receiver& receiver, const Notification& notification,
                                      std::uint64_t not_delivered);
-  /// Ends a send() that is under way, and all later ones, at once.
+  /// Ends a running send() at once, and makes all later calls of send() return at once.
   void stop();
 
  private:

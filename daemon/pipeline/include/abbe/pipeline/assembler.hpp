@@ -45,7 +45,8 @@ class Assembler {
   /// Appends the complete snapshots to `out`, oldest first.
   void emit(std::vector<protocol::Snapshot>& out);
   void accept(SensorAcceptance acceptance) { environment_.accept(std::move(acceptance)); }
-  /// The state of the sensors at the start: of a further file in a replay, or of an earlier run.
+  /// Sets the state of the environment sensors before the first sample: in a replay that of the
+  /// previous file, live that of an earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
     return environment_.go_on(sensor_state);
   }
@@ -69,7 +70,8 @@ class Assembler {
   std::deque<protocol::AxisSample> axes_;
   EnvironmentMerge environment_;
   protocol::HostTime newest_{};
-  /// A later time is wrong: it neither makes other streams late nor is waited for.
+  /// Samples with a later time are invalid: such a time neither makes other streams late nor is
+  /// waited for.
   protocol::HostTime latest_ = protocol::HostTime::max();
 };
 

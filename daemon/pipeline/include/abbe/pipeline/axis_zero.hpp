@@ -3,12 +3,12 @@
 /// When the card is set up, its counters start at 0 at the current positions, and the axes are not
 /// referenced. An axis gets its zero from reference marks, or when the operator states that the
 /// axis is at its configured offset (`abbe reference --here`); it loses the zero when the counters
-/// restart. Without a zero the axis is missing in every sample. With zero = "here" in the table of
-/// the card, axes without marks are taken to be at their offset at the first set-up, but not after
-/// a restart of the counters. Each axis is treated separately. The uncertainty of a zero is a
-/// systematic error common to all readings of the axis and is not added to their uncertainty.
-/// Deterministic: depends on the times in the samples only, so that a replay from raw bytes gives
-/// the readings of the live run. Not for the RT path; not thread-safe.
+/// restart. While an axis has no zero, every sample marks it as missing. With zero = "here" in the
+/// table of the card, axes without marks are assumed to be at their offset when the card is set up
+/// for the first time, but not after a restart of the counters. Each axis is treated separately.
+/// The uncertainty of a zero is a systematic error common to all readings of the axis and is not
+/// added to their uncertainty. Deterministic: depends on the times in the samples only, so that a
+/// replay from raw bytes gives the readings of the live run. Not for the RT path; not thread-safe.
 
 #include <cstdint>
 #include <deque>
@@ -42,18 +42,18 @@ struct ZeroState {
 
 class AxisZeros {
  public:
-  /// How axes without reference marks are treated. NeedAZero: they are referenced once the operator
-  /// states their zero. Untouched: their readings are not changed, as in recordings without
-  /// kZeroRule.
+  /// How axes without reference marks are treated. NeedAZero: they are not referenced until the
+  /// operator states their zero. Untouched: their readings are not changed, as in recordings
+  /// without kZeroRule.
   enum class WithoutMarks { NeedAZero, Untouched };
-  /// Without a counter card in `config` the object changes no sample.
+  /// If `config` has no counter card, the object changes no sample.
   explicit AxisZeros(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
-  /// For a replay that begins with a later file: starts from the state at the end of the previous
-  /// file instead of from the first set-up of the card. Axes in the mask `state.unknown` lose every
-  /// zero found before `state.at`.
+  /// For a replay that does not begin with the first file of a recording: starts from the state at
+  /// the end of the previous file instead of from the first set-up of the card. Axes in the mask
+  /// `state.unknown` lose every zero found before `state.at`.
   void go_on(const ZeroState& state);
-  /// Adds a zero. To be called in order of time.
+  /// Adds a zero. Call it in order of time.
   void found(const FoundZero& zero);
   /// Sets the readings of axis samples, of touches and of the scans around touches.
   void apply(Batch& batch);
@@ -66,8 +66,8 @@ class AxisZeros {
   struct Axis {
     std::size_t place = 0;
     double step = 0.0;
-    double offset = 0.0;        // used by the driver
-    bool zero_is_here = false;  // the zero is known at the first set-up
+    double offset = 0.0;        // offset that the driver has used
+    bool zero_is_here = false;  // the zero is known at the first set-up of the card
     std::deque<FoundZero> coming;
     std::optional<FoundZero> current;
   };
@@ -78,16 +78,16 @@ class AxisZeros {
   void apply_to_counts(Counted& sample) const;
 
   std::vector<Axis> axes_;
-  // a sample was applied: a restart of the counters is not the first set-up any more
+  // a sample was applied: from now on a restart of the counters is not the first set-up
   bool begun_ = false;
 };
 
 /// Name of the attachment of a FoundZero in the recording, for a replay from raw bytes.
 inline constexpr std::string_view kZeroName = "datum.json";
-/// Key in the version entries of a recording. With it, axes without marks needed a zero, too
-/// (WithoutMarks::NeedAZero).
+/// Key in the version entries of a recording. In a recording with this key, axes without marks are
+/// not referenced until the operator states their zero (WithoutMarks::NeedAZero).
 inline constexpr const char* kZeroRule = "datum";
-/// Name of the attachment with the time at which a search for reference marks started: it uses
+/// Name of the attachment with the start time of a search for reference marks. The search uses only
 /// crossings and samples later than this time.
 inline constexpr std::string_view kReferenceRequestName = "reference.json";
 [[nodiscard]] RecordingAttachment reference_request(protocol::HostTime from);

@@ -20,18 +20,19 @@ struct RawFromDevice {
   protocol::RawBlock block;
 };
 
-/// Key in the version entries of a recording. With it, no two axis samples of the recording have
-/// the same instant. Without it (older versions of abbe), a second sample of the same instant may
-/// follow, which only marks further axes of the first sample as missing.
+/// Key in the version entries of a recording. In a recording with this key, no two axis samples
+/// have the same instant. In one without it (older versions of abbe), a second sample with the same
+/// instant may follow, which only marks further axes of the first sample as missing.
 inline constexpr const char* kAxisSamplesRule = "axis_samples";
 
-/// Key in the version entries of a recording. With it, a rotary axis of [encoder] began in its
-/// travel. Without it (older versions of abbe), its first count was used as sent.
+/// Key in the version entries of a recording. In a recording with this key, the first reading of a
+/// rotary axis of [encoder] was chosen nearest to the middle of its travel. In one without it
+/// (older versions of abbe), the first count was used as sent.
 inline constexpr const char* kRotaryTravelRule = "rotary_travel";
 
 struct Batch {
-  /// Time of the cycle. It is recorded, so that a replay repeats the same cycles. clear() does not
-  /// reset this time.
+  /// Time of the cycle. The recorder stores it, so that a replay repeats the same cycles. clear()
+  /// does not reset it.
   protocol::HostTime taken{};
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;

@@ -4,8 +4,8 @@
 /// count 0). The zero refers to the counters, which continue without the daemon. It stays valid if
 /// the card and its set-up are the same, the computer was not rebooted, and the clock count of the
 /// card shows that the counters have continued (drivers::CounterCardReceiverOptions::resume_from).
-/// The file may be seconds old without harm: a zero changes only when an axis is referenced, and
-/// the file is then written within a second. Not for the RT path.
+/// The file may be a few seconds old: a zero changes only when an axis is referenced, and the file
+/// is then written within a second. Not for the RT path.
 
 #include <filesystem>
 #include <optional>

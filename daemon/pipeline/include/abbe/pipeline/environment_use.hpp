@@ -37,7 +37,8 @@ struct EnvironmentUseOptions {
   AirConfig air;
   double tracker_u_scale = 0.0;               ///< TrackerSource::u_scale
   std::optional<std::string> unmeasured_air;  ///< unmeasured_air_text()
-  SensorCheckOptions sensors;                 ///< empty: readings are used as they are
+  /// options of the sensor checks; empty: readings are used without a check
+  SensorCheckOptions sensors;
 };
 
 [[nodiscard]] EnvironmentUseOptions environment_use(const Config& config);
@@ -57,7 +58,7 @@ struct EnvironmentEffect {
 [[nodiscard]] std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& snapshot,
                                                          const EnvironmentUseOptions& options);
 
-/// Readings of X, Y, Z corrected to true positions, as in correct_for_temperature().
+/// Readings of X, Y, Z corrected to true positions, with the formula of correct_for_temperature().
 [[nodiscard]] std::array<double, 3> at_temperature(std::array<double, 3> reading_m,
                                                    const EnvironmentEffect& effect,
                                                    const EnvironmentUseOptions& options);
@@ -78,28 +79,29 @@ class MeanEffect {
 /// device that measures it (there is at most one), else from the tracker. If a device has sent
 /// nothing for longer than max_age, its values are NaN. Air values that a tracker assumes without
 /// measuring are not merged.
-/// Every reading is checked (SensorChecks), in the order of SensorQueue. The temperature of a scale
-/// is the applied one: it follows the readings at a limited rate.
+/// Every reading is checked (SensorChecks), in the order of SensorQueue. For the temperature of a
+/// scale the result is the applied temperature, which follows the readings at a limited rate.
 class EnvironmentMerge {
  public:
   /// A sample of an environment device is used only for instants at least `lag` later than its own.
-  /// The assembler's watermark as `lag`: by then the sample has arrived, so that the order of
-  /// arrival does not matter. The environment changes so slowly that the delay is negligible.
+  /// `lag` is the assembler's watermark: after this time the sample has arrived, so that the order
+  /// of arrival does not matter. The environment changes so slowly that the delay is negligible.
   EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
 
   void take(const Batch& batch);
   /// The merged values that apply at `t`; nullopt before the first sample.
   [[nodiscard]] std::optional<protocol::EnvironmentSample> at(protocol::HostTime t);
-  /// Removes samples that at() needs only for instants before `oldest`.
+  /// Removes the samples that at() would need only for instants before `oldest`.
   void forget(protocol::HostTime oldest);
   [[nodiscard]] protocol::HostTime newest() const noexcept { return newest_; }
 
-  /// The sensors whose readings are not used, after the samples that were checked until now.
+  /// The sensors whose readings are not used, according to the samples checked so far.
   [[nodiscard]] std::vector<SensorFinding> findings() const { return queue_.checks().findings(); }
   [[nodiscard]] const SensorChecks& sensors() const noexcept { return queue_.checks(); }
   void accept(SensorAcceptance acceptance) { queue_.accept(std::move(acceptance)); }
   [[nodiscard]] std::vector<SensorDoubts> doubts() const { return queue_.checks().doubts(); }
-  /// Continues from the state at the start of a further file, or from that of an earlier run.
+  /// Continues from the state of the sensors at the start of a further file, or from that of an
+  /// earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
     return queue_.checks().go_on(sensor_state);
   }

@@ -43,16 +43,16 @@ class LiveView {
   }
   [[nodiscard]] const SensorChecks& sensors() const noexcept { return environment_.sensors(); }
   void accept(SensorAcceptance acceptance) { environment_.accept(std::move(acceptance)); }
-  /// Continues from the state of an earlier run.
+  /// Continues from the state of the sensors in an earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
     return environment_.go_on(sensor_state);
   }
   [[nodiscard]] std::vector<SensorDoubts> sensor_doubts() const { return environment_.doubts(); }
-  /// Why the correction of each axis for the temperature of its scale is missing; empty: it is not.
-  /// Same order as Snapshot::position.
+  /// For each axis: why the correction for the temperature of its scale is missing; empty: it is
+  /// not missing. Same order as Snapshot::position.
   [[nodiscard]] std::vector<std::string> missing_scales() const;
-  /// The same reasons with the names of the axes, if X, Y and Z are missing for no other reason.
-  /// Empty: they are not missing, or a reading is.
+  /// The reasons of missing_scales() with the names of the axes, if X, Y or Z is missing only for
+  /// such a reason. Empty: no axis is missing, or a reading itself is missing.
   [[nodiscard]] std::string why_scales_alone_are_missing() const;
   /// Instant of the latest axis sample, even if axes are missing in that sample.
   [[nodiscard]] std::optional<protocol::HostTime> axes_at() const noexcept {

@@ -53,9 +53,10 @@ class Pipeline {
   /// The observer must outlive the pipeline.
   void add(PipelineObserver& observer) { observers_.push_back(&observer); }
 
-  /// Applies to the readings that are due after its instant.
+  /// The acceptance applies to the readings after its instant.
   void accept(SensorAcceptance acceptance) { assembler_.accept(std::move(acceptance)); }
-  /// The state of the sensors at the start: of a further file in a replay, or of an earlier run.
+  /// Sets the state of the environment sensors before the first sample: in a replay that of the
+  /// previous file, live that of an earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
     return assembler_.go_on(sensor_state);
   }
@@ -71,7 +72,7 @@ class Pipeline {
   AxisZeros* zeros_;
   Assembler assembler_;
   std::vector<PipelineObserver*> observers_;
-  std::vector<protocol::Snapshot> snapshots_;  // reused: allocates only at first
+  std::vector<protocol::Snapshot> snapshots_;  // reused, so that only the first cycles allocate
 };
 
 }  // namespace abbe::daemon

@@ -1,7 +1,7 @@
 #pragma once
-/// The rules by which this version of abbe makes and uses samples, for the version entries of a
-/// recording. A replay of a recording without one of them does what versions without the rule did.
-/// Everything that makes a recording of a live run adds them.
+/// The rules by which this version of abbe makes and uses samples, as version entries of a
+/// recording. If an entry is missing, a replay behaves like the versions of abbe without that rule.
+/// All code that makes a recording of a live run adds the entries.
 
 #include <string>
 #include <utility>

@@ -1,15 +1,15 @@
 #pragma once
-/// Finds the zero of each axis from its distance-coded marks, with two cards: one counts the axes
-/// live, the other latches its counts of the same axes at their marks. Takes the samples of both
-/// cards while the operator drives the axes over a few marks; the search ends separately for each
-/// axis. Reads no clock and starts no thread, so that a replay gives the results of the live run.
-/// Not for the RT path; not thread-safe.
+/// Finds the zero of each axis from its distance-coded marks. Two cards count the same axes: the
+/// live card is read all the time, the other card latches its counts at the marks. This class takes
+/// the samples of both cards while the operator moves the axes over a few marks. The search ends
+/// separately for each axis. Reads no clock and starts no thread, so that a replay gives the
+/// results of the live run. Not for the RT path; not thread-safe.
 ///
 /// Each card maps its counted clock to host time, so that the scans of the two cards are aligned
 /// with a standard uncertainty u_alignment. At a mark, the live count is between its smallest and
 /// its largest value within u_alignment of the crossing. Every mark therefore narrows the interval
-/// that contains the difference between the zeros of the two counters. Drive slowly: at 1 mm/s and
-/// u_alignment = 1 ms, one mark gives the difference to 2 um.
+/// that contains the difference between the zeros of the two counters. The axes should move slowly:
+/// at 1 mm/s and u_alignment = 1 ms, one mark gives the difference to 2 um.
 
 #include <cstdint>
 #include <deque>
@@ -31,7 +31,7 @@ struct ReferenceAxis {
   std::uint8_t latched_axis = 0;  ///< index in the latching card's samples
   /// `counts_per_period` has the sign of the live card's step
   drivers::MarkTraverseOptions marks;
-  double period = 20e-6;  ///< of the scale's signal, m or rad
+  double period = 20e-6;  ///< signal period of the scale, m or rad
   /// An axis is Found once the half width of the interval that contains the difference between the
   /// zeros of the two counters is at most this.
   double max_half_width_counts = 0.75;
@@ -49,7 +49,7 @@ struct AxisReference {
   /// reading (m or rad) at count 0 of the live counter, relative to the zero mark of the scale
   double offset = 0.0;
   double u_offset = 0.0;
-  std::string reason;  ///< why the latest mark gave no zero, or why the search failed
+  std::string reason;  ///< why the latest mark did not give the zero, or why the search failed
 };
 
 class ReferenceSession {
@@ -70,7 +70,8 @@ class ReferenceSession {
     drivers::CounterAlignment alignment;
     std::optional<drivers::MarkZero> zero;
     AxisReference result;
-    protocol::HostTime followed{};  ///< the traverse has the axis positions up to this time
+    /// the samples up to this time have been evaluated for the traverse
+    protocol::HostTime followed{};
   };
 
   void process_crossings();
@@ -95,7 +96,8 @@ class ReferenceSession {
 /// Request to set the zero of axes without marks: the current position of each axis is defined as
 /// the one at which the axis reads its configured offset.
 struct SetZeroHere {
-  static constexpr double kByEye = 100e-6;  ///< m or rad; for a position set by eye
+  /// m or rad; for an axis that the operator has positioned by eye
+  static constexpr double kByEye = 100e-6;
 
   std::vector<std::string> axes;  ///< empty: all axes without marks
   double u = kByEye;              ///< standard uncertainty of the position, m or rad

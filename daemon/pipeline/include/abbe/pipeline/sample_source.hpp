@@ -1,6 +1,6 @@
 #pragma once
-/// Source of the hub's samples: the devices, or a substitute in a test. To be used from the hub's
-/// thread only, where a function does not say otherwise.
+/// Source of the hub's samples: the devices, or a substitute in a test. Functions may be called
+/// only from the hub's thread unless their comment states otherwise.
 
 #include <array>
 #include <chrono>

@@ -1,8 +1,7 @@
 #pragma once
-/// A person states that a sensor whose readings are refused is right. Its history is then
-/// discarded:
-/// it is used when its next readings agree with each other. Recorded, so that a replay does the
-/// same.
+/// Statement of a person that a sensor is correct although its readings are refused. The history of
+/// the sensor is then discarded, and the sensor is used as soon as its next readings agree with
+/// each other. The statement is recorded, so that a replay does the same.
 
 #include <string>
 #include <string_view>
@@ -15,14 +14,15 @@ namespace abbe::daemon {
 
 struct SensorAcceptance {
   std::string sensor;
-  protocol::HostTime from{};  ///< applies to readings that are due later (SensorQueue)
+  /// applies to readings that become due after this instant (see SensorQueue)
+  protocol::HostTime from{};
   std::string who, why;
 };
 
-/// Name of the attachment in the recording.
+/// Name of the attachment in a recording.
 inline constexpr std::string_view kSensorAcceptedName = "sensor-accepted.json";
 [[nodiscard]] RecordingAttachment to_attachment(const SensorAcceptance& acceptance);
-/// Error BadInput if the attachment cannot be read.
+/// Reads the attachment. Error BadInput if it cannot be read.
 [[nodiscard]] Result<SensorAcceptance> sensor_acceptance_from(
     const RecordingAttachment& attachment);
 

@@ -1,8 +1,8 @@
 #pragma once
-/// Checks the readings of all environment sensors with the parts in calib/environment, and keeps
-/// for each sensor its history, the value that is used, and why a reading is not. Depends on the
-/// samples and their times only: a replay that starts from the same state gives the same values.
-/// Not for the RT path; not thread-safe.
+/// Checks the readings of all environment sensors with the functions of calib/environment. For each
+/// sensor it keeps the history, the value that is used, and the reason why a reading is not used.
+/// The result depends on the samples and their times only: a replay that starts from the same state
+/// gives the same values. Not for the RT path; not thread-safe.
 
 #include <array>
 #include <chrono>
@@ -24,27 +24,27 @@ namespace abbe::daemon {
 /// A sensor whose readings are not used now.
 struct SensorFinding {
   std::string sensor, device;
-  std::vector<std::string> axes;  ///< whose readings are corrected with it
+  std::vector<std::string> axes;  ///< axes whose readings are corrected with this sensor
   calib::SensorDoubt doubt = calib::SensorDoubt::None;
   bool held = false;  ///< the last good value is used; false: there is no value
-  /// Which sensor, its value, what was expected and what to do. It changes only when `doubt` or
-  /// `held` changes.
+  /// Sentence with the sensor, its value, the expected value, and what the operator can do. It
+  /// changes only when `doubt` or `held` changes.
   std::string text;
 };
 
-/// How often readings of a sensor were not used since the start.
+/// How often the readings of a sensor began to be refused since the start.
 struct SensorDoubts {
   std::string device;
-  std::uint64_t count = 0;  ///< times that a doubt began
+  std::uint64_t count = 0;  ///< number of times a doubt about the sensor began
   protocol::HostTime latest{};
   std::string latest_text;
 };
 
-/// A sample with the values that are used.
+/// A sample after the check, with the values that are used.
 struct CheckedEnvironment {
   protocol::EnvironmentSample sample;
-  /// of temperature_K: where the applied value was at the instant of the sample. It follows
-  /// temperature_K from there (calib::followed_value()).
+  /// For each element of temperature_K: the applied value at the instant of the sample. From there
+  /// the applied value follows temperature_K (calib::followed_value()).
   std::array<calib::FollowedValue, protocol::kMaxTemperatures> applied{};
 };
 
@@ -54,33 +54,36 @@ class SensorChecks {
 
   [[nodiscard]] bool empty() const noexcept { return sensors_.empty(); }
 
-  /// Replaces the readings of `sample` in `mask` by the values that are used; NaN: none. A sample
-  /// that is not later than the previous one of a sensor gets the present value of the sensor.
+  /// Replaces the readings of `sample` in `mask` by the values that are used; NaN: there is none. A
+  /// sample that is not later than the previous one of a sensor gets the present value of the
+  /// sensor.
   [[nodiscard]] CheckedEnvironment checked(const protocol::EnvironmentSample& sample,
                                            protocol::EnvironmentMask mask);
 
-  /// A sample with the readings in `mask`, taken at `taken`, is dated `ahead` after that: it is not
-  /// used, and counts as a doubt of its sensors.
+  /// Reports a sample whose time is wrong: it was taken at `taken`, but is dated `ahead` later.
+  /// `mask`: readings in the sample. The sample is not used, and counts as a doubt about its
+  /// sensors.
   void note_future(protocol::EnvironmentMask mask, protocol::HostTime taken,
                    std::chrono::nanoseconds ahead);
 
   /// The quantities that the device `device` measures.
   [[nodiscard]] protocol::EnvironmentMask mask_of(std::string_view device) const;
 
-  /// In the order of the sensors in EnvironmentSample.
+  /// The sensors whose readings are not used now, in the order of the sensors in EnvironmentSample.
   [[nodiscard]] std::vector<SensorFinding> findings() const;
-  /// The sensors that were in doubt since the start, also for a single reading.
+  /// The sensors whose readings were refused at least once since the start.
   [[nodiscard]] std::vector<SensorDoubts> doubts() const;
   /// The applied temperature of channel `channel` at `t`.
   [[nodiscard]] double applied(const CheckedEnvironment& checked, std::size_t channel,
                                protocol::HostTime t) const;
 
   /// Checks whether a person may accept `sensor` now. Error Usage: there is no such sensor. Error
-  /// Refused: its readings are used already, or a fault must be repaired first; the text says
-  /// which.
+  /// Refused: its readings are used already, or a fault must be repaired first; the text names the
+  /// case.
   [[nodiscard]] Result<void> check_acceptance(std::string_view sensor) const;
-  /// Discards the history of the sensor: it is used when its next readings agree with each other,
-  /// wherever the other sensors are. Also ends the doubt about it and a twin that is silent.
+  /// Discards the history of the sensor, which is then used when its next readings agree with each
+  /// other, whatever the other sensors read. Also ends the doubt about its twin if the twin sends
+  /// nothing.
   void accept(std::string_view sensor);
 
   /// State at the start of a further file of a recording, or of a further run.
@@ -96,18 +99,19 @@ class SensorChecks {
     calib::SensorTrack track = {};
     calib::HeldValue held = {};
     calib::FollowedValue applied = {};
-    double usable = kNone;  ///< the last reading, if nothing was wrong with it alone
+    double usable = kNone;  ///< the last reading, if the checks of this sensor alone accept it
     double used = kNone;    ///< output
-    // Kept by the first sensor of a pair:
-    int twin_differs = 0;           ///< comparisons in a row
-    bool twins_doubted = false;     ///< since the last comparison
-    std::chrono::nanoseconds at{};  ///< of the last sample
+    // The following members are used only in the first sensor of a pair of twins.
+    int twin_differs = 0;        ///< number of successive comparisons in which the twins differed
+    bool twins_doubted = false;  ///< the last comparison confirmed that the twins differ
+    std::chrono::nanoseconds at{};  ///< instant of the last sample
     bool judged = false;
-    bool accepted = false;  ///< the first reading is not compared with other sensors
+    /// the first reading is not compared with other sensors, because a person accepted the sensor
+    bool accepted = false;
     calib::SensorDoubt doubt = calib::SensorDoubt::None;
-    double reading = kNone, lowest = kNone, highest = kNone;  ///< when the doubt began
+    double reading = kNone, lowest = kNone, highest = kNone;  ///< at the beginning of the doubt
     std::uint64_t doubts = 0;
-    std::chrono::nanoseconds latest{};  ///< when the latest doubt began
+    std::chrono::nanoseconds latest{};  ///< instant at which the latest doubt began
     std::string latest_text = {};
   };
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -126,7 +130,8 @@ class SensorChecks {
   double start_spread_K_;
 };
 
-/// Name of the attachment of the state, at the start of each further file of a recording.
+/// Name of the attachment with the state of the checks, at the start of each further file of a
+/// recording.
 inline constexpr std::string_view kSensorStateName = "sensor-state.json";
 
 }  // namespace abbe::daemon

@@ -1,9 +1,9 @@
 #pragma once
 /// Passes environment samples to SensorChecks in an order that does not depend on their arrival, so
-/// that pipeline, live view, recorder and replay come to the same values. A sample of an
-/// environment device is due `lag` after its instant: by then the earlier ones of all devices have
-/// arrived. A sample of the tracker's weather station is due in the cycle that took it.
-/// Deterministic; not for the RT path; not thread-safe.
+/// that pipeline, live view, recorder and replay get the same values. A sample of an environment
+/// device is due `lag` after its instant: by then the earlier samples of all devices have arrived.
+/// A sample of the tracker's weather station is due in the cycle that took it. Deterministic; not
+/// for the RT path; not thread-safe.
 
 #include <chrono>
 #include <cstddef>
@@ -17,8 +17,8 @@
 namespace abbe::daemon {
 
 /// Largest time by which the instant of a sample may be later than the cycle that took it. A later
-/// instant is a fault of the device's clock: until then no further sample of its sensors would
-/// count.
+/// instant is a fault of the device's clock. If it were accepted, all further samples of its
+/// sensors up to that instant would be ignored.
 inline constexpr std::chrono::seconds kMostAhead{1};
 
 class SensorQueue {
@@ -26,7 +26,7 @@ class SensorQueue {
   struct Waiting {
     protocol::HostTime due{};
     bool weather = false;
-    std::size_t device = 0;  ///< as added
+    std::size_t device = 0;  ///< index of the device as passed to add()
     protocol::EnvironmentMask mask = 0;
     protocol::EnvironmentSample sample;
   };
@@ -34,18 +34,20 @@ class SensorQueue {
   SensorQueue(SensorCheckOptions options, std::chrono::nanoseconds lag)
       : checks_(std::move(options)), lag_(lag) {}
 
-  /// `taken`: time of the cycle; HostTime{}: not known. A sample dated later than kMostAhead after
-  /// it is not used; the doubts name it.
+  /// `taken`: time of the cycle; HostTime{}: not known. A sample dated later than `taken` by more
+  /// than kMostAhead is not used and counts as a doubt.
   void add(std::size_t device, const protocol::EnvironmentSample& sample,
            protocol::EnvironmentMask mask, protocol::HostTime taken);
-  /// As add(), for the tracker's weather station; due at `taken`, or else at its own instant.
+  /// As add(), for a sample of the tracker's weather station. It is due at `taken`, or at its own
+  /// instant if `taken` is not known.
   void add_weather(std::size_t device, const protocol::EnvironmentSample& sample,
                    protocol::EnvironmentMask mask, protocol::HostTime taken);
 
-  /// Applies to the samples that are due after its instant.
+  /// The acceptance applies to the samples that become due after its instant.
   void accept(SensorAcceptance acceptance);
 
-  /// Checks the samples that are due at `t`. use(const Waiting&, const CheckedEnvironment&).
+  /// Checks the samples that are due at `t` and calls use(const Waiting&, const
+  /// CheckedEnvironment&) for each of them.
   template <class Use>
   void check_until(protocol::HostTime t, Use use) {
     std::size_t done = 0;
@@ -57,7 +59,7 @@ class SensorQueue {
     accept_before(t);
   }
 
-  /// Not checked yet, in the order in which they will be.
+  /// Samples that are not checked yet, in the order in which they will be checked.
   [[nodiscard]] const std::vector<Waiting>& waiting() const noexcept { return waiting_; }
   [[nodiscard]] SensorChecks& checks() noexcept { return checks_; }
   [[nodiscard]] const SensorChecks& checks() const noexcept { return checks_; }
@@ -69,7 +71,7 @@ class SensorQueue {
   SensorChecks checks_;
   std::chrono::nanoseconds lag_;
   std::vector<Waiting> waiting_;
-  std::vector<SensorAcceptance> acceptances_;  ///< not applied yet, by time
+  std::vector<SensorAcceptance> acceptances_;  ///< not applied yet, ordered by time
 };
 
 }  // namespace abbe::daemon

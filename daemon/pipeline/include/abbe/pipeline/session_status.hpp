@@ -31,18 +31,18 @@ enum class SessionState : std::uint8_t {
   return state == SessionState::Warming || state == SessionState::Acquiring;
 }
 
-/// A table of the model, as far as the run determines it.
+/// A table of the model, as far as the run has determined it.
 struct LiveTable {
   std::string name;          ///< "EXX", "EC0Y"
   bool is_angle = false;     ///< values in rad, else in m
   std::vector<double> at_m;  ///< nodes; empty: squareness, which has one value
-  /// One per node; NaN where the run does not determine it yet.
+  /// One element per node; NaN where the run does not determine the value yet.
   std::vector<double> value, u;
 
-  [[nodiscard]] bool determined() const noexcept;  ///< at every node
+  [[nodiscard]] bool determined() const noexcept;  ///< true if every node is determined
 };
 
-/// The tables of a run that is not complete; u: standard uncertainty.
+/// The tables of a run that is not complete. u: standard uncertainty.
 struct LiveTables {
   std::vector<LiveTable> tables;
   std::size_t samples = 0;  ///< tracker points used
@@ -56,34 +56,36 @@ struct FeatureToTouch {
   std::size_t points = 0;   ///< points planned
   /// Centre of a ball, or of the touched points of a block; nullopt: not known yet.
   std::optional<std::array<double, 3>> at_m{};
-  /// Of the face of a block, to the side that the calibrator states; nullopt: not known yet.
+  /// Normal of the face of a block, towards the side that the calibrator states; nullopt: not known
+  /// yet.
   std::optional<std::array<double, 3>> normal{};
 };
 
 /// The touch that a guided acquisition asks for.
 struct RequestedTouch {
-  int position = 0;         ///< of a ball array, from 1; 0: `measurement` names it
-  std::string measurement;  ///< with a bar
-  std::size_t place = 0;    ///< index of position or measurement in the plan, from 0
+  /// number of the position of a ball array, counted from 1; 0: `measurement` names the position
+  int position = 0;
+  std::string measurement;  ///< name of the measurement, for a bar
+  std::size_t place = 0;    ///< index of the position or measurement in the plan, from 0
   std::string on;           ///< the feature: "ball 3", "hole 4"
   std::size_t touched = 0;  ///< points taken on this feature
   std::size_t points = 0;   ///< points planned on this feature
-  /// In measuring order; null: not a ball array. Shared with replies that other threads write;
-  /// never changed.
+  /// All features of the position in measuring order; null: not a ball array. Shared with replies
+  /// that other threads write; never changed.
   std::shared_ptr<const std::vector<FeatureToTouch>> features{};
 };
 
-/// Something that a run needs before the machine may drive off.
+/// A condition that must hold before the machine may start the run.
 struct StartCondition {
   std::string name;  ///< "tracker", "axes", "position", "standstill"
   bool met = false;
-  std::string text;  ///< what holds, or what is missing
+  std::string text;  ///< text: the condition holds, or what is missing
 };
 
-/// Whether the machine may drive off; only while a run waits for it.
+/// Whether the machine may start the run. Valid only while a run waits for its start.
 struct StartState {
-  bool ready = false;   ///< all conditions hold: drive now
-  bool missed = false;  ///< the machine has driven off too early
+  bool ready = false;   ///< all conditions hold: the machine may start now
+  bool missed = false;  ///< the machine has started too early
   std::vector<StartCondition> conditions;
 };
 
@@ -91,27 +93,27 @@ struct StartState {
 struct SessionVerdict {
   std::string figures;               ///< the held-out residuals
   std::vector<std::string> reasons;  ///< why the model is refused or not activated; empty: accepted
-  std::vector<std::string> notes;    ///< what does not speak against the model but must be known
+  std::vector<std::string> notes;    ///< remarks that are no reasons against the model
 };
 
 struct SessionStatus {
   std::uint64_t id = 0;  ///< number of the session in this process, from 1; 0: none yet
   SessionState state = SessionState::Idle;
   std::string method = "otf";
-  std::string reason;  ///< why the session is in this state, or what to do now
+  std::string reason;  ///< why the session is in this state, or what the operator must do now
   /// in state Refused: the kind of error, for the exit code of the client
   ErrorCode refused_as = ErrorCode::DataInsufficient;
-  double progress = 0.0;  ///< of the work in this state, 0 to 1
+  double progress = 0.0;  ///< progress of the work in this state, 0 to 1
   std::size_t points = 0;
-  /// in state Acquiring: estimated time to its end, in host time
+  /// in state Acquiring: estimated time to the end of this state, in host time
   std::optional<std::chrono::nanoseconds> remaining{};
-  std::optional<StartState> start{};  ///< in state Warming, of a run along a path
+  std::optional<StartState> start{};  ///< in state Warming of a run along a path
   /// Tables of the run so far; null: there are none yet. Shared with replies that other threads
   /// write; never changed.
   std::shared_ptr<const LiveTables> live{};
   std::optional<SessionVerdict> verdict{};  ///< in states Active and Refused, if there is a model
-  /// in state Refused: the command that identifies the recorded run again, with other options;
-  /// empty: nothing was identified, or it is not recorded
+  /// in state Refused: the command that identifies the recorded run again with other options;
+  /// empty: nothing was identified, or the run is not recorded
   std::string again{};
   std::string model_id;                ///< the model of this session, active or refused
   std::optional<RequestedTouch> next;  ///< touch requested by a guided acquisition

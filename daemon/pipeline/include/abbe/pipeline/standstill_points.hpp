@@ -1,10 +1,10 @@
 #pragma once
-/// The points of a verification ([Li OMM] section 5.4): for each standstill of the machine, the
-/// mean axis readings and the mean tracker position. For a tracker in stationary mode, which
-/// delivers mean values, and for a tracker that measures continuously. Tracker points nearer than
-/// `settle` to either end of a standstill are left out: the machine may still vibrate, or the
-/// averaging time of a mean value may include motion. The result depends on snapshots only, not on
-/// a clock. Not for the RT path; not thread-safe.
+/// Collects the points of a verification ([Li OMM] section 5.4): for each standstill of the machine
+/// the mean axis readings and the mean tracker position. Works with a tracker in stationary mode,
+/// which delivers mean values, and with a tracker that measures continuously. Tracker points that
+/// are nearer than `settle` to the beginning or end of a standstill are left out: the machine may
+/// still vibrate, or the averaging time of a mean value may include motion. The result depends on
+/// snapshots only, not on a clock. Not for the RT path; not thread-safe.
 
 #include <chrono>
 #include <cstddef>
@@ -21,8 +21,8 @@ struct StandstillOptions {
   /// Largest change of an axis reading since the start of a standstill that still counts as
   /// standstill: noise and vibration.
   double tolerance_m = 50e-6;
-  /// Time at either end of a standstill that is left out. At least the averaging time of a tracker
-  /// in stationary mode, whose default is 0.5 s.
+  /// Time at the beginning and at the end of a standstill that is left out. Must be at least the
+  /// averaging time of a tracker in stationary mode, whose default is 0.5 s.
   std::chrono::nanoseconds settle = std::chrono::milliseconds{500};
 };
 
@@ -57,7 +57,7 @@ class StandstillPoints {
   StandstillOptions options_;
   std::deque<StandstillPoint> points_;  // a deque: push_back() never copies earlier points
   bool running_ = false;
-  Sample first_;                // of the standstill; the sums are relative to it
+  Sample first_;                // first sample of the standstill; the sums are relative to it
   std::deque<Sample> pending_;  // samples nearer than `settle` to the newest one
   StandstillPoint open_;
   std::size_t taken_ = 0;

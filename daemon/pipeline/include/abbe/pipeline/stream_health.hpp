@@ -15,10 +15,11 @@ struct StreamHealth {
   double rate_hz = 0.0;
   double latency_p50_s = 0.0;
   double latency_p99_s = 0.0;
-  /// Durations of Device::receive() since the thread started, also of calls without data. They do
-  /// not contain the time from arrival to the return of wait(). Empty if it is not a device.
+  /// Durations of Device::receive() since the thread started, also of calls without data. The time
+  /// from the arrival of data to the return of wait() is not included. Empty if the stream is not a
+  /// device.
   drivers::LatencyHistogram::Counts latency{};
-  /// Recorder: age of the oldest message that is not yet written to the file, s.
+  /// for the recorder only: age of the oldest message that is not yet written to the file, s
   std::optional<double> behind_s = {};
 };
 

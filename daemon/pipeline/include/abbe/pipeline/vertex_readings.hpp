@@ -36,7 +36,8 @@ class VertexReadings {
   /// Discards the reading of the current vertex. Call it when the machine moves there before its
   /// run has begun.
   void forget() { slowest_.reset(); }
-  /// Message if the reading of the last vertex differs from the path by more than is allowed.
+  /// Message if the reading of the last vertex differs from the path by more than the allowed
+  /// difference; nullopt: it does not.
   [[nodiscard]] std::optional<std::string> contradiction() const;
 
  private:

@@ -29,7 +29,7 @@ class DdsSupervisor {
   using WallTime = std::chrono::steady_clock::time_point;
 
   struct Options {
-    std::filesystem::path program;       ///< abbe-dds
+    std::filesystem::path program;       ///< path of abbe-dds
     std::vector<std::string> arguments;  ///< without argv[0]
     int priority = 0;                    ///< SCHED_FIFO; 0, or not permitted: SCHED_OTHER
     /// If the child ran for this time, it is restarted without delay.
@@ -41,8 +41,8 @@ class DdsSupervisor {
     /// State shared with the hub, which records the answers of the child in it; must outlive the
     /// supervisor. null: a hanging child is not detected.
     DdsProcess* process = nullptr;
-    std::chrono::milliseconds hung_after{2000};       ///< time without an answer
-    std::chrono::milliseconds hung_at_start{10'000};  ///< before the first answer
+    std::chrono::milliseconds hung_after{2000};       ///< longest time without an answer
+    std::chrono::milliseconds hung_at_start{10'000};  ///< longest time before the first answer
   };
 
   /// Starts the child. Error (Io) if the program cannot be started at all (missing, not
@@ -77,7 +77,7 @@ class DdsSupervisor {
   WallTime next_start_{};
   std::chrono::milliseconds delay_{0};
   std::uint64_t restarts_ = 0;
-  bool hung_ = false;  // the child was killed because it did not answer
+  bool hung_ = false;  // the supervisor killed the child because it did not answer
   std::optional<DdsEnd> last_end_;
   std::string start_fault_;
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// Converts the daemon's data to the types of abbe_v1.idl. Only copies values and evaluates the
-/// model; no other mathematics. Pure, thread-safe; allocates.
+/// Converts the daemon's data to the types of abbe_v1.idl. These functions copy values and evaluate
+/// the model; they contain no other mathematics. Pure, thread-safe; allocates.
 
 #include <cstdint>
 #include <optional>
@@ -30,11 +30,11 @@ struct PublishedModel {
   /// The largest U(V), k = 2, of calib::iso::volume_error(); nullopt: it cannot be computed.
   std::optional<double> largest_U_m = {};
   bool simulated = false;                                 ///< its data came from simulated devices
-  std::optional<calib::TrackerPlace> tracker_place = {};  ///< not published; for updates
+  std::optional<calib::TrackerPlace> tracker_place = {};  ///< not published; needed for updates
   calib::VolumetricModel model;
 };
 
-/// Which machine publishes, beside its name.
+/// Identifies the publishing machine, in addition to its name.
 struct PublishedIdentity {
   std::string machine_id;  ///< UUID
   std::string twin_seen;   ///< another publisher that claims to be this machine; empty: none
@@ -54,7 +54,7 @@ struct Stamp {
 [[nodiscard]] v1::ErrorModel model_message(const PublishedModel&, const Stamp&);
 /// The volumetric error V at the nodes of calib::interpolation_grid(), of which there are at most
 /// 4096, in slices of the size that the IDL allows. If every_node is false, V and cov_m2 include
-/// calib::interpolation_error(). Of a model with backlash V and cov_m2 are those of
+/// calib::interpolation_error(). For a model with backlash, V and cov_m2 are computed as in
 /// compensation_message().
 [[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const PublishedModel&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason,
@@ -64,9 +64,9 @@ struct Stamp {
                                             const Stamp&);
 /// The volumetric error V at the axis position of the live view, for the given tool. V is zero and
 /// `inside` is false if there is no model, if the model is not valid for this tool, or if the axis
-/// positions are not known. In the last case this message also has STALE instead of ACTIVE. Of a
-/// model with backlash V is the mean of both directions of travel, whatever the axes do, and cov_m2
-/// includes half the difference and its uncertainty.
+/// positions are not known. In the last case the message also has the status STALE instead of
+/// ACTIVE. For a model with backlash, V is the mean of both directions of travel, whatever the axes
+/// do, and cov_m2 includes half the difference and its uncertainty.
 [[nodiscard]] v1::Compensation compensation_message(v1::ModelStatus, const PublishedModel*,
                                                     const protocol::Snapshot&,
                                                     const std::array<double, 3>& tool_offset_m,

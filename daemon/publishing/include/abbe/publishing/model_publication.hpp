@@ -1,7 +1,7 @@
 #pragma once
-/// The payloads of ErrorModel and ErrorGrid of a model. Encoding takes long (4096 nodes with
-/// covariance), so it is done by the thread that reads the model. The publisher only sets the
-/// sequence numbers. Pure, thread-safe; allocates.
+/// The encoded payloads of ErrorModel and ErrorGrid of a model. Encoding takes long (4096 nodes
+/// with covariance); therefore the thread that reads the model encodes it, and the publisher only
+/// sets the sequence numbers. Pure, thread-safe; allocates.
 
 #include <cstddef>
 #include <string_view>

@@ -2,8 +2,8 @@
 /// Sends the daemon's data to abbe-dds, each topic with its own timing:
 /// - live topics (Snapshot, Compensation) at their configured rates;
 /// - ErrorModel and ErrorGrid when the model changes;
-/// - ModelState when it changes and every second, because the age in it changes, and Identity
-///   before it, so that a subscriber knows whose state it is;
+/// - ModelState when it changes and every second, because it contains an age; Identity before each
+///   ModelState, so that a subscriber knows the machine to which the state belongs;
 /// - Health every second and when it changes.
 ///
 /// abbe-dds repeats durable topics for late joiners. Periods are CLOCK_MONOTONIC time, also with
@@ -41,9 +41,10 @@ struct ActiveModelState {
   v1::ModelStatus status = v1::ModelStatus::MODEL_NONE;
   std::string reason;
   const PublishedModel* model = nullptr;
-  const ModelPublication* publication = nullptr;  ///< of `model`
+  const ModelPublication* publication = nullptr;  ///< encoded messages of `model`
   std::uint64_t revision = 0;                     ///< changes whenever another model becomes active
-  /// Why the gate refused the model that a person activated nevertheless; empty: it accepted it.
+  /// Why the gate refused a model that a person has nevertheless activated; empty: the gate
+  /// accepted it.
   std::string refused{};
 };
 
@@ -60,10 +61,11 @@ class Publisher {
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
   void compensation(const protocol::Snapshot& view, const ActiveModelState& active,
                     protocol::HostTime now, WallTime wall);
-  /// Published with the next model(), which takes twin_seen from the link.
+  /// Sets the identity that the next call of model() publishes. model() takes twin_seen from the
+  /// link.
   void set_identity(PublishedIdentity identity) { options_.identity = std::move(identity); }
   /// Call it in every cycle. Sends the model if another model has become active, and the state if
-  /// it changed or is due.
+  /// it has changed or is due.
   void model(const ActiveModelState& active, protocol::HostTime now, WallTime wall);
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);
   void event(const SessionEvent& event);

@@ -13,7 +13,7 @@ namespace abbe::daemon {
 
 struct KeepRule {
   std::filesystem::file_time_type now;
-  std::chrono::hours keep{};  ///< [recording] keep_days
+  std::chrono::hours keep{};  ///< value of [recording] keep_days
   std::string running;        ///< RecorderOptions::name of this run
   /// Duration of this run since its start or since its clock was last set.
   std::chrono::nanoseconds lasted{};

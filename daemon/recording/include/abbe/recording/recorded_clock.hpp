@@ -1,7 +1,7 @@
 #pragma once
-/// What happened to the wall clock while a recording was written. The dates of its messages come
-/// from one offset, taken at the start of abbed; an attachment states how far the clock was away
-/// from them later.
+/// Changes of the wall clock while a recording was written. The dates of all messages are computed
+/// with one offset, which is taken at the start of abbed. An attachment states by how much the
+/// clock differed from this offset later.
 
 #include "abbe/base/clock_steps.hpp"
 #include "abbe/messages/recording_info.hpp"
@@ -12,14 +12,16 @@ namespace abbe::daemon {
 
 inline constexpr std::string_view kClockChangeName = "clock-change.json";
 
-/// Replaces the change of an earlier attachment: both are since the start of abbed.
+/// Makes the attachment. It replaces an earlier one, because both contain the change since the
+/// start of abbed.
 [[nodiscard]] RecordingAttachment to_attachment(const ClockChange& change);
 
 struct RecordedClock {
-  protocol::UtcOffset dates;  ///< of samples, by the wall clock as it was at the end
-  ClockChange change;         ///< since the start of abbed
+  /// converts host times of samples to dates, by the wall clock at the end of the recording
+  protocol::UtcOffset dates;
+  ClockChange change;  ///< change since the start of abbed
 };
-/// An attachment that cannot be read is ignored.
+/// Reads the attachment. An attachment that cannot be read is ignored.
 [[nodiscard]] RecordedClock recorded_clock(const RecordingReader& recording);
 
 }  // namespace abbe::daemon

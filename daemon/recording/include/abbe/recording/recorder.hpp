@@ -61,10 +61,11 @@ struct RecorderOptions {
       std::chrono::seconds{5};       ///< after the disk was full or failed
   std::uint64_t min_free_bytes = 0;  ///< the disk counts as full if less than this is free
   std::uint64_t max_file_bytes = 0;  ///< approximate; 0: no limit
-  /// Of the live run: a further file begins with the state of the sensors.
+  /// Sensors of the live run: a further file begins with the state of their checks.
   SensorCheckOptions sensors;
-  std::string weather_station;  ///< name of the tracker, whose own weather readings it sends
-  std::chrono::nanoseconds watermark = std::chrono::milliseconds{600};  ///< AssemblerOptions
+  std::string weather_station;  ///< name of the tracker whose weather station sends readings
+  /// as AssemblerOptions::watermark
+  std::chrono::nanoseconds watermark = std::chrono::milliseconds{600};
 };
 
 struct RecorderStatus {
@@ -91,23 +92,23 @@ struct RecorderStatus {
   /// characters)
   std::uint64_t refused = 0;
 };
-/// "recording", "disk full" ...
+/// The name of the state: "recording", "disk full" ...
 [[nodiscard]] std::string_view name(RecorderStatus::State state) noexcept;
 
-/// The hash of the first `bytes` bytes of `file`: `head -c BYTES FILE | sha256sum`.
+/// The hash of the first `bytes` bytes of a file, as of `head -c BYTES FILE | sha256sum`.
 struct RecordingDigest {
   std::string sha256;  ///< hex
   std::uint64_t bytes = 0;
   std::filesystem::path file;
-  /// Which part of the calibration that was requested last is not recorded: "12 messages of the run
-  /// are missing". Empty: nothing is missing.
+  /// The part of the last requested calibration that is not recorded: "12 messages of the run are
+  /// missing". Empty: nothing is missing.
   std::string gap;
 };
 
 class Recorder {
  public:
-  /// Wall time even with simulated devices: the data lost by a power cut depend on real time, not
-  /// on simulated time.
+  /// Times of the recorder are wall times, even with simulated devices: the data lost by a power
+  /// cut depend on real time, not on simulated time.
   using WallTime = std::chrono::steady_clock::time_point;
 
   /// Creates the file, and the directory if needed. Error (Io) if a file of that name exists. A
@@ -146,8 +147,8 @@ class Recorder {
   /// recording continues in the next file after retry_period.
   void fail(const std::string& what);
 
-  /// Since when the oldest message of the open chunk waits; nullopt: no chunk is open, all messages
-  /// are written or lost.
+  /// Time at which the oldest message of the open chunk was recorded; nullopt: no chunk is open,
+  /// all messages are written or lost.
   [[nodiscard]] std::optional<WallTime> open_chunk_since() const;
 
   /// The hash of everything written to the present file so far.

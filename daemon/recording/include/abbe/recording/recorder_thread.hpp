@@ -23,9 +23,9 @@ namespace abbe::daemon {
 struct RecorderThreadOptions {
   RecorderOptions recorder;
   DeviceNames devices;  ///< as in the recording
-  bool raw = true;      ///< record the device bytes, too
-  /// Enough for two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. Limited,
-  /// because the memory may be locked.
+  bool raw = true;      ///< true: also record the raw bytes of the devices
+  /// The default is enough for two minutes of a stalled disk with axes at 1 kHz and a tracker at
+  /// 500 Hz. The size is limited because the memory may be locked.
   std::size_t most_waiting_bytes = 64 << 20;
 };
 
@@ -37,7 +37,7 @@ class RecorderThread : public PipelineObserver {
   RecorderThread& operator=(const RecorderThread&) = delete;
   ~RecorderThread() override;  ///< closes the file cleanly
 
-  /// Hands over what the batch holds.
+  /// Passes the samples of the batch to the recorder's thread.
   void on_samples(const Batch& batch) override;
 
   void hand_over(const Batch& batch);
@@ -51,9 +51,10 @@ class RecorderThread : public PipelineObserver {
   /// The last status that the recorder reported, at most two of its cycles (40 ms) old. The
   /// reference is valid until the next call.
   [[nodiscard]] const RecorderStatus& status() const;
-  /// Age of the oldest message that was handed over and is not yet written to the file; 0: all are.
-  /// In normal operation at most RecorderOptions::chunk_period and a cycle of the recorder. Wall
-  /// time, to 50 ms. Messages that were dropped or lost do not count.
+  /// Age, in wall time, of the oldest message that was handed over and is not yet written to the
+  /// file; 0: all are written. Accurate to 50 ms. In normal operation it is at most
+  /// RecorderOptions::chunk_period plus one cycle of the recorder. Messages that were dropped or
+  /// lost do not count.
   [[nodiscard]] std::chrono::nanoseconds behind(Recorder::WallTime now) const;
   /// Number of messages that were dropped because more than most_waiting_bytes would have waited.
   [[nodiscard]] std::uint64_t dropped() const noexcept;

@@ -4,8 +4,9 @@
 /// replay`. Damaged parts are skipped and listed in losses(). All messages of undamaged chunks are
 /// delivered, and all whole messages of a chunk that is truncated by the end of the file.
 ///
-/// Reads every file that MCAP allows, also one that another program wrote again: with or without
-/// indexes, summary, repeated channels, chunks. Not compressed chunks.
+/// Reads every file that MCAP allows, except files with compressed chunks. Files rewritten by
+/// another program can be read as well: with or without indexes, summary, repeated channels,
+/// chunks.
 ///
 /// The file is read piece by piece. If it becomes shorter meanwhile, cursors end early and intact()
 /// is an Error. Checksums are checked when the file is opened. Const functions may be used by
@@ -32,17 +33,17 @@ namespace abbe::daemon {
 /// Result of the checksum test of the recorded configuration.
 enum class MetadataCheck : std::uint8_t {
   Right,
-  Unchecked,  ///< the recording has no checksum: it is of an older version of abbe
+  Unchecked,  ///< the recording has no checksum, because an older version of abbe made it
   Damaged,
 };
 
 /// A damaged part: "cut off at byte 4711, inside a chunk: 12 of its messages could be read".
 struct RecordingLoss {
-  std::uint64_t offset = 0;  ///< of the damaged part in the file
+  std::uint64_t offset = 0;  ///< position of the damaged part in the file
   std::uint64_t bytes = 0;   ///< its length
   std::string what;
-  /// True if data within the recording are missing or wrong. False if all other data are undamaged:
-  /// only the end is missing, as after a kill or a power cut, or only an index.
+  /// True if data within the recording are missing or wrong. False if only the end is missing, as
+  /// after a kill or a power cut, or only an index is damaged; all other data are then undamaged.
   bool inside = true;
 };
 
@@ -77,9 +78,9 @@ class RecordingReader {
   class Cursor;
 
   /// Opens the file. Error (Io) if it cannot be read; Error (BadInput) if it is not a recording of
-  /// abbe (no MCAP magic, or truncated before the end of its metadata). All of the file is read;
-  /// `stopped` is asked meanwhile on this thread and may be empty. DataInsufficient soon after it
-  /// returned true, which it must do from then on.
+  /// abbe (no MCAP magic, or truncated before the end of its metadata). The whole file is read.
+  /// Meanwhile `stopped`, which may be empty, is called on this thread. If it returns true, open()
+  /// soon returns DataInsufficient; from then on `stopped` must always return true.
   [[nodiscard]] static Result<RecordingReader> open(const std::filesystem::path& file,
                                                     const std::function<bool()>& stopped = {});
   ~RecordingReader();
@@ -99,7 +100,7 @@ class RecordingReader {
   [[nodiscard]] std::span<const RecordingLoss> losses() const noexcept;
   /// The damage within the recording in one sentence: "the recording is damaged: chunk 3 ... (and 2
   /// more places)". A model identified from such a recording may be wrong by more than its
-  /// uncertainty. Empty: there is no such damage.
+  /// uncertainty. Empty: there is no damage within the recording.
   [[nodiscard]] std::string damage() const;
   [[nodiscard]] MetadataCheck configuration_check() const noexcept;
 
@@ -107,15 +108,15 @@ class RecordingReader {
   /// Times at which the hub took the first and the last message; nullopt if there are no messages.
   [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range()
       const noexcept;
-  /// Error (Io) if the file became shorter, changed, or could not be read since it was opened. Then
-  /// what was read is incomplete. Check it after the last message.
+  /// Error (Io) if the file became shorter, changed, or could not be read since it was opened. The
+  /// messages read before are then incomplete. Call it after the last message.
   [[nodiscard]] Result<void> intact() const;
   /// SHA-256 of the whole file in hex; reads all of it.
   [[nodiscard]] std::string sha256() const;
 
-  /// All messages in the order of `taken`, at equal times in the order of recording. Messages of
-  /// one topic always keep the order of recording, because log_time of older recordings is the
-  /// instant described and need not ascend.
+  /// All messages in the order of `taken`; messages with equal `taken` in the order in which they
+  /// were recorded. Messages of one topic always keep the order of recording: in older recordings
+  /// log_time is the described instant and need not ascend.
   [[nodiscard]] Cursor messages() const;
   /// Delivers all messages to the sink. Returns the number of messages that have a callback and
   /// could not be decoded.

@@ -1,8 +1,8 @@
 #pragma once
 /// Replays a recording through the same receivers, assembler, session and identification as in the
-/// live run, and gives a model with the same hash. The input is either the decoded samples or the
-/// raw device bytes; the speed is the recorded one, a multiple of it, or as fast as possible. The
-/// clock is read only to keep that speed.
+/// live run, and gives a model with the same hash as in the live run. The input is either the
+/// decoded samples or the raw device bytes; the speed is the recorded speed, a multiple of it, or
+/// as fast as possible. The clock is read only to keep that speed.
 
 #include <chrono>
 #include <cstdint>
@@ -29,8 +29,8 @@ struct ReplayOptions {
   /// with no compensation.
   const calib::VolumetricModel* active = nullptr;
   std::function<void(double share)> progress;
-  /// Asked often, on the thread of the replay. Once it returned true, which it must do from then on,
-  /// the replay returns an Error soon.
+  /// Called often, on the thread of the replay. If it returns true, the replay soon returns an
+  /// Error; from then on it must always return true.
   std::function<bool()> stopped;
   /// Called for every cycle with the batch that the assembler gets, and with the time at which the
   /// first message of the recording was taken.
@@ -49,14 +49,14 @@ struct ReplayedCalibration {
   /// gives the reason, for example that the recording ends too early.
   SessionStatus ended;
   std::optional<Result<Candidate>>
-      outcome;             ///< of a complete run; nullopt if it was passed to ReplayOptions::runs
+      outcome;  ///< result for a complete run; nullopt if the run was passed to ReplayOptions::runs
   std::string model_hash;  ///< empty without a model
   std::string model_id;
-  std::string points_sha256;  ///< of the points or touches that entered the identification
+  std::string points_sha256;  ///< hash of the points or touches that the identification used
   ObservedTimes observed{};   ///< host times of the recording
 };
 
-/// The zero of one axis: the one found live, and the one that the replay found from the reference
+/// The zero of one axis: the zero found live, and the zero that the replay found from the reference
 /// marks in the raw bytes of both cards.
 struct ReplayedZero {
   std::string axis;
@@ -70,9 +70,9 @@ struct ReplayReport {
   std::vector<ReplayedZero> zeros;          ///< from raw bytes only
   std::vector<std::string> live_model_ids;  ///< from the calibration events in the recording
   std::uint64_t snapshots = 0;
-  std::uint64_t samples = 0;            ///< of all devices, recorded or decoded from bytes
+  std::uint64_t samples = 0;  ///< number of samples of all devices, recorded or decoded from bytes
   std::uint64_t undecodable = 0;        ///< messages that could not be decoded
-  std::chrono::nanoseconds recorded{};  ///< from the first to the last message
+  std::chrono::nanoseconds recorded{};  ///< time from the first to the last message
 };
 
 /// Adds the damage of `recording` to the verdict on a model that was identified from it. Data of a

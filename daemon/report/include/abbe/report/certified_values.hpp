@@ -1,5 +1,5 @@
 #pragma once
-/// The values that report and certificate state, as text: both print these texts, so that their
+/// The values that report and certificate state, as text. Both print the same texts, so that their
 /// numbers are equal.
 
 #include <string>
@@ -14,11 +14,11 @@ namespace abbe::daemon {
 /// value has the same number of decimals ([GUM] 7.2.6).
 struct CertifiedValue {
   std::string key;                    ///< unique and stable, for programs: "X.M", "EYX", "PPP.E"
-  std::string name;                   ///< for people
+  std::string name;                   ///< name for people
   std::string value;                  ///< decimal number; empty: not estimable
   std::string U{};                    ///< empty: no uncertainty is stated
-  bool is_angle = false;              ///< urad, else um
-  std::string why{};                  ///< why it is not estimable
+  bool is_angle = false;              ///< true: urad; false: um
+  std::string why{};                  ///< why the value is not estimable
   double value_si = 0.0, u_si = 0.0;  ///< m or rad, not rounded; u: k = 1
 };
 
@@ -30,10 +30,11 @@ struct ValueGroup {
 struct CertifiedValues {
   calib::iso::StandardValues standard;
   calib::iso::VolumeError volume;
-  std::vector<ValueGroup> groups;  ///< volume first, then those of the standards
+  /// first the group of the volume, then the groups of the standards
+  std::vector<ValueGroup> groups;
 };
 
-/// DataInsufficient if the model has no validity volume.
+/// The values of a model. DataInsufficient if it has no validity volume.
 [[nodiscard]] Result<CertifiedValues> certified_values(const ModelDocument& document);
 
 }  // namespace abbe::daemon

@@ -18,16 +18,16 @@ namespace abbe::daemon {
 /// from y - 2 u to y + 2 u is drawn; else, if `low` and `high` are not empty, a band between them.
 struct Curve {
   std::string name;
-  std::string key{};  ///< error motion of a table: "EXX"; else empty
+  std::string key{};  ///< for a table, the name of the error motion: "EXX"; else empty
   std::vector<double> x, y, u{};
   std::vector<double> low{}, high{};
-  std::size_t dot_every = 1;  ///< dots at the points 0, n, 2 n ..; 0: no dots
+  std::size_t dot_every = 1;  ///< dots at points 0, n, 2 n ...; 0: no dots
 };
 
 struct LineChart {
   std::string title, x_label, y_label;
   std::vector<Curve> curves{};
-  bool wide = false;  ///< as wide as the page, else two charts share a row
+  bool wide = false;  ///< true: as wide as the page; false: two charts share a row
 };
 
 /// Counts of values in equal intervals from the smallest to the largest value of all series. The
@@ -60,7 +60,7 @@ struct VectorChart {
 
 /// The lit lamp of a traffic light. Unlit: there is no verdict.
 enum class Signal { Red = 0, Yellow = 1, Green = 2, Unlit = 3 };
-/// "red", "yellow", "green"; "no verdict"
+/// The word for a lamp: "red", "yellow", "green"; "no verdict" for Unlit.
 [[nodiscard]] std::string_view lamp_name(Signal signal) noexcept;
 
 /// Any text may be given: it is escaped. The page has the width of a printed A4 page.
@@ -78,17 +78,19 @@ class HtmlReport {
   void plot(const LineChart&);
   void plot(const Histogram&);
   void plot(const VectorChart&);
-  /// A traffic light with a text, which also says what the light means.
+  /// A traffic light with a text that also states what the light means.
   void signal(Signal signal, std::string_view text);
   void list(const std::vector<std::string>& items);
   void page_break();
-  /// What is added in between is set in two columns and small print, so that it fits on one page.
+  /// Elements added between the two calls are set in two columns and small print, so that they fit
+  /// on one page.
   void begin_columns();
   void end_columns();
-  /// What is added in between is set in small print, so that it fits on the first page.
+  /// Elements added between the two calls are set in small print, so that they fit on the first
+  /// page.
   void begin_front();
   void end_front();
-  /// At the foot of each printed page, beside "page n of N".
+  /// Text at the foot of each printed page, beside "page n of N".
   void footer(std::string_view text);
   void maps(const ValueMaps&);
   void drawing(const SpaceDrawing&);

@@ -1,7 +1,7 @@
 #pragma once
 /// Reports made from stored models, the same for every method: one model, two models side by side,
-/// all models of a machine. HTML without JavaScript that prints on A4. The same input gives
-/// the same bytes in the same time zone; no date is contained that is not in the input.
+/// all models of a machine. The HTML has no JavaScript and prints on A4. The same input in the same
+/// time zone gives the same bytes; the report contains only dates of the input.
 
 #include <optional>
 #include <string>
@@ -14,34 +14,36 @@
 
 namespace abbe::daemon {
 
-/// A model and what the store knows of it.
+/// A model, with the information that the store has of it.
 struct ReportSubject {
   ModelDocument document;
-  std::optional<StoreEntry> entry{};  ///< nullopt: a file, not in a store
+  std::optional<StoreEntry> entry{};  ///< nullopt: the model is in a file and not in a store
   std::vector<StoreEvent> events{};   ///< of this model, oldest first
   CertificateDetails details{};
-  std::optional<std::string> machine_hash{};  ///< ModelInUse::machine_hash
-  /// Who had a certificate of the model made although it must not be used, and why.
+  std::optional<std::string> machine_hash{};  ///< see ModelInUse::machine_hash
+  /// Set if a certificate of the model was made although the model must not be used: who had it
+  /// made, and why.
   std::optional<StoreActor> forced{};
-  /// Of the machine, when the model was identified; empty: the store is not in a data folder of
-  /// abbed.
+  /// The identity of the machine when the model was identified; empty: the store is not in a data
+  /// folder of abbed.
   std::string machine_id{};
-  std::string identity_doubt{};  ///< ModelInUse::identity_doubt
+  std::string identity_doubt{};  ///< see ModelInUse::identity_doubt
 };
 [[nodiscard]] ModelInUse in_use(const ReportSubject& subject, ModelPurpose purpose);
 
-/// A model of the store with its verdict and its events.
+/// Reads a model of the store with its verdict and its events.
 [[nodiscard]] Result<ReportSubject> report_subject(const ModelStore& store, const std::string& id);
 
-/// The report of every method, from what the store has. DataInsufficient if the model has no
+/// The report of one model, the same for every method. DataInsufficient if the model has no
 /// validity volume.
 [[nodiscard]] Result<std::string> model_report(const ReportSubject& subject);
 
-/// Two models side by side. DataInsufficient if they are not valid for a common tool and volume.
+/// The comparison of two models. DataInsufficient if they are not valid for a common tool and
+/// volume.
 [[nodiscard]] Result<std::string> comparison_report(const ReportSubject& a, const ReportSubject& b);
 
-/// Trend over models of one machine, in the order of the dates of their measurement; where that is
-/// not recorded, of the identification.
+/// The trend over the models of one machine, ordered by the date of their measurement, or by that
+/// of their identification where the first is not recorded.
 [[nodiscard]] Result<std::string> trend_report(const std::vector<ReportSubject>& models);
 
 }  // namespace abbe::daemon

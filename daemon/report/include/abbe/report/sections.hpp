@@ -1,5 +1,5 @@
 #pragma once
-/// Sections that the reports of several methods have in common.
+/// Sections that the reports of several methods use.
 
 #include <string>
 #include <string_view>
@@ -13,21 +13,22 @@
 
 namespace abbe::daemon {
 
-/// "12.35 um".
+/// The length as text: "12.35 um".
 [[nodiscard]] std::string um_text(double length_m, int decimals = 2);
 
-/// At the foot of each printed sheet: id and hash of the model, beside the number of the page.
+/// Adds id and hash of the model at the foot of each printed sheet, beside the page number.
 void add_footer(HtmlReport& page, const ModelDocument& document);
 
-/// What certificate.toml states; else that it is not stated, with the `key` that would.
+/// `text`, the entry of certificate.toml. If it is empty: a text that it is not stated, with the
+/// `key` of the entry.
 [[nodiscard]] std::string stated(const std::string& text, std::string_view key);
-/// "AT960 123456, level": name and serial number of the instruments with this use.
+/// Name and serial number of the instruments with this use: "AT960 123456, level".
 [[nodiscard]] std::string instruments_of(const CertificateDetails& details, EquipmentUse use);
-/// The person of certificate.toml with the role.
+/// The person named in certificate.toml, with the role.
 [[nodiscard]] std::string signed_by(const CertificateDetails& details);
-/// A line for name, date and signature; empty: to be filled in by hand.
+/// A line for name, date and signature. Empty arguments leave space to fill in by hand.
 void add_signature(HtmlReport& page, const std::string& name = {}, const std::string& date = {});
-/// Text for a row of the first page: shortened to the width of the page, with "...".
+/// `text`, shortened with "..." to the width of a row of the first page.
 [[nodiscard]] std::string shortened(std::string text);
 
 /// Adds the origin of a model, the additional rows `more`, and the input files of this report.

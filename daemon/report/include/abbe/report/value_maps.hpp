@@ -1,7 +1,7 @@
 #pragma once
-/// Maps of a value over a plane, beside each other, with one colour scale: cells from light (0) to
-/// dark (largest value), so that the order is also visible to people with colour vision deficiency
-/// and in a print without colours. Drawn as SVG. Pure.
+/// Maps of a value over a plane, side by side, with one colour scale: from light (0) to dark
+/// (largest value). The order of the values is therefore also visible to people with colour vision
+/// deficiency and in a print without colours. Drawn as SVG. Pure.
 
 #include <cstddef>
 #include <string>
@@ -12,7 +12,7 @@ namespace abbe::daemon {
 
 struct ValueMap {
   std::string title;
-  /// Of the cells, ascending, in the unit of the axes: n + 1 edges of n cells.
+  /// Edges of the cells, ascending, in the unit of the axes: n + 1 edges for n cells.
   std::vector<double> x_edges, y_edges;
   /// Values >= 0, one per cell, x fastest. NaN: no value, the cell is hatched.
   std::vector<double> values;
@@ -22,7 +22,8 @@ struct ValueMaps {
   std::string title, x_label, y_label;
   std::string scale_label;  ///< quantity and unit of the values
   std::vector<ValueMap> maps;
-  std::size_t least_places = 1;  ///< a map is not wider than if so many were beside each other
+  /// a map is not wider than if this number of maps were side by side
+  std::size_t least_places = 1;
 };
 
 /// An SVG element. Each cell with a value carries the value in the attribute data-v.

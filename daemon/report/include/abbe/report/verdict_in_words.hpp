@@ -1,5 +1,5 @@
 #pragma once
-/// The state of a model of the store, for report and page.
+/// The state of a stored model as a lamp and text, for report and page.
 
 #include <string>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// A lamp, and words. Notes are no reasons against the model.
+/// A lamp with its text. Notes in the text are no reasons against the model.
 struct VerdictInWords {
   Signal signal = Signal::Unlit;
   std::string text;

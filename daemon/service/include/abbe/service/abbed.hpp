@@ -20,22 +20,23 @@ namespace abbe::daemon {
 struct AbbedOptions {
   std::string configuration_text;  ///< text of the configuration file; stored in the recording
   std::string dds_program;  ///< path of abbe-dds; started as a child if dds.supervise is Child
-  WallClock clock{};        ///< of all dates
-  bool dds_unit = false;    ///< systemd runs abbe-dds, unless the configuration decides
+  WallClock clock{};        ///< source of all dates
+  /// true: systemd runs abbe-dds, unless the configuration states otherwise
+  bool dds_unit = false;
 };
 
 class Abbed {
  public:
-  /// Starts all parts; after an error none is left running. Io for what the system refuses (socket,
-  /// directory, real-time priority).
+  /// Starts all parts. If an error occurs, all parts that were started are ended again. Io if the
+  /// system refuses something (socket, directory, real-time priority).
   [[nodiscard]] static Result<std::unique_ptr<Abbed>> start(Config config, AbbedOptions options);
   Abbed(const Abbed&) = delete;
   Abbed& operator=(const Abbed&) = delete;
-  /// As end(), and closes the recording.
+  /// Calls end() and closes the recording.
   ~Abbed();
 
-  /// Stops the measuring machine, then the other parts. Returns whether the machine is stopped;
-  /// nullopt: there is none. The last call.
+  /// Stops the measuring machine, then ends the other parts. Returns whether the machine is
+  /// stopped; nullopt: there is none. No other function may be called afterwards.
   std::optional<drivers::IppStop> end();
 
   /// Call at least every 50 ms from the thread that called start(). Supervises abbe-dds, removes
@@ -44,10 +45,11 @@ class Abbed {
   /// True if the hub began a cycle within the last second. If false, the caller must not notify
   /// systemd's watchdog, which then restarts abbed.
   [[nodiscard]] bool alive() const;
-  /// Stops a measuring machine that moves; it then awaits a release. Takes no lock. Call it when
-  /// the hub is not alive: the hub can no longer stop the machine when its operator is gone.
+  /// Stops a measuring machine that moves; the machine then waits for a release. Takes no lock.
+  /// Call it when the hub is not alive, because the hub can then no longer stop the machine when no
+  /// client supervises it.
   void stop_machine();
-  /// Warnings of the start, one log line each.
+  /// Warnings that occurred during the start, one log line each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:

@@ -84,7 +84,7 @@ template <class Work>
       });
 }
 
-/// Whether work started by run_abandonable() is still running. If so, the process must exit by
+/// True if work started by run_abandonable() is still running. The process must then exit by
 /// _exit(), because a normal exit would destroy static objects that this work uses.
 [[nodiscard]] bool background_tasks_running() noexcept;
 

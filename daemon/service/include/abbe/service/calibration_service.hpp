@@ -60,10 +60,10 @@ class CalibrationService {
   /// hub's.
   [[nodiscard]] Result<PreparedCalibration> prepare(CalibrationTask task) const;
   /// Starts a session and returns its id. Refused while another session runs. Afterwards `prepared`
-  /// may hold data of the previous session; the caller destroys it.
+  /// may contain data of the previous session; the caller destroys it.
   [[nodiscard]] Result<std::uint64_t> start(PreparedCalibration&& prepared, const std::string& who,
                                             protocol::HostTime now);
-  /// prepare() and start() in one call, for callers without a real-time thread.
+  /// Calls prepare() and start(), for callers without a real-time thread.
   [[nodiscard]] Result<std::uint64_t> start(CalibrationTask task, const std::string& who,
                                             protocol::HostTime now);
   /// Cancels the session.
@@ -109,12 +109,13 @@ class CalibrationService {
   WallClock clock_;
   CalibrationSession session_;
   LiveTablesWatch live_tables_;
-  std::future<Result<KeptModel>> task_;        // identifies and stores, or stores again
-  std::shared_ptr<IdentificationLink> link_;   // with the last identification
-  std::shared_ptr<JudgedModel> model_;         // to be stored; shared with the storing thread
-  std::uint64_t revision_before_storing_ = 0;  // of the authority
-  std::string again_;                          // identifies the last identified run again
-  std::uint64_t again_of_ = 0;                 // the session of that run
+  std::future<Result<KeptModel>> task_;  // identifies and stores a model, or stores a model again
+  std::shared_ptr<IdentificationLink> link_;  // connection to the last identification
+  std::shared_ptr<JudgedModel> model_;        // to be stored; shared with the storing thread
+  // revision of the model authority at the start of storing
+  std::uint64_t revision_before_storing_ = 0;
+  std::string again_;           // the command that identifies the last identified run again
+  std::uint64_t again_of_ = 0;  // number of the session of that run
 };
 
 }  // namespace abbe::daemon

@@ -25,12 +25,12 @@
 ///     {"do": "tracker_reflectors"}
 ///
 /// "machine" with "stop" returns "stop", the number of the request. "machine" and "status" (as
-/// "machine_stop") contain the latest one: {"number", "outcome", "text"}; so does "touches", once a
-/// cancelled job has ended. "outcome" is "pending", "stopped" (AbortE was answered, or no motion
-/// was under way), "not confirmed" (refused, not answered, connection lost) or "not sent" (no
-/// connection). Repeat "machine" until the outcome of that number, or of a later one, is not
-/// "pending". After the last two the machine may be moving; AbortE is then the first command on the
-/// next connection.
+/// "machine_stop") contain the latest request to stop: {"number", "outcome", "text"}. "touches"
+/// also contains it once a cancelled job has ended. "outcome" is "pending", "stopped" (AbortE was
+/// answered, or no motion was under way), "not confirmed" (refused, not answered, connection lost)
+/// or "not sent" (no connection). Repeat "machine" until the outcome of that number, or of a later
+/// one, is not "pending". After "not confirmed" and "not sent" the machine may still be moving;
+/// AbortE is then the first command on the next connection.
 ///
 /// "touch" is refused as a whole if a place is not finite or outside the volume, or if a normal is
 /// not a unit vector.
@@ -50,11 +50,12 @@
 /// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of
 /// "status" alone; "calibration" the "request" of the present or last session. "activate" and
 /// "rollback" change the model store, as `abbe model` does; the daemon follows the store. They
-/// return the "change" and, if it is done, the "id" of the active model; until then ask with
-/// "change". "rollback" is refused if another model than "active" is active: a request that is
-/// repeated because its answer was lost does not go one model further back. The calling thread
-/// reads the request and writes the answer. Hub::call() runs the part that needs the hub's thread;
-/// the duration of this part does not depend on the size of the request.
+/// return the number of the "change" and, if it is already done, the "id" of the active model;
+/// until then ask with the request "change". "rollback" is refused if a model other than "active"
+/// is active. A request that is repeated because its answer was lost therefore does not go back by
+/// another model. The calling thread reads the request and writes the answer. Hub::call() runs the
+/// part that needs the hub's thread; the duration of this part does not depend on the size of the
+/// request.
 
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -81,8 +82,8 @@ struct ControlVerb {
     Hub& hub, const nlohmann::json& request, const ControlPeer& peer,
     std::chrono::milliseconds time_out = std::chrono::seconds{3});
 
-/// As answer_request(), but executes all steps on the calling thread: for a hub that has no thread
-/// of its own.
+/// As answer_request(), but executes all steps on the calling thread. For a hub without its own
+/// thread.
 [[nodiscard]] nlohmann::json answer_on_hub(const Hub& hub, const nlohmann::json& request,
                                            const ControlPeer& peer);
 

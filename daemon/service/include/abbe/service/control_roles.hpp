@@ -12,13 +12,14 @@
 namespace abbe::daemon {
 
 enum class Role {
-  Look,    ///< reads state, or stops a motion
-  Change,  ///< changes the active model or the zero of an axis, or may lead to such a change
-  Move,    ///< moves a machine or a tracker, or keeps it moving
+  Look,  ///< may read the state or stop a motion
+  /// may change the active model or the zero of an axis, or start work that can lead to this
+  Change,
+  Move,  ///< may move a machine or a tracker, or keep it moving
 };
 
-/// Refused unless `peer` has the role; the error names the role, the group that has it, and what to
-/// do. Does not wait for a name service: see AccountNames. Any thread.
+/// Refused unless `peer` has the role; the error names the role, the group that has it, and the
+/// remedy. Does not wait for a name service: see AccountNames. Any thread.
 [[nodiscard]] Result<void> check_role(const ControlPeer& peer, Role role, std::string_view request,
                                       const ControlConfig& control);
 

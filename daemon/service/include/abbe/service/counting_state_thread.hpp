@@ -21,10 +21,10 @@ class CountingStateThread {
  public:
   static constexpr std::chrono::seconds kEndTimeout = kLongestCountingEnd;
 
-  /// `look` returns the state to write and runs on the new thread; nullopt leaves the file
-  /// unchanged. `report` is called once for each new fault of the file, also on the new thread. If
-  /// the disk does not answer at the end, the destructor calls `report` on its own thread. Neither
-  /// function is called after the destructor has returned.
+  /// `look` returns the state to write and is called on the new thread; if it returns nullopt, the
+  /// file is not changed. `report` is called once for each new fault of the file, also on the new
+  /// thread. If the disk does not answer at the end, the destructor calls `report` on the
+  /// destructor's thread. Neither function is called after the destructor has returned.
   CountingStateThread(std::filesystem::path file,
                       std::function<std::optional<CountingState>()> look,
                       std::function<void(const std::string&)> report,

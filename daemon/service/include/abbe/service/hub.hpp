@@ -54,18 +54,20 @@ struct HubParts {
   VerificationService* verification = nullptr;
   TrackerService* tracker = nullptr;
   StoreChanges* store_changes = nullptr;
-  /// The user of abbe-dds, which reads the network: it has no role on the control socket.
+  /// The user as which abbe-dds runs. Because abbe-dds reads the network, this user has no role on
+  /// the control socket.
   std::optional<uid_t> network_user = {};
   IdentityWatch* identity = nullptr;
   SensorService* sensors = nullptr;
-  /// State of the checks of the sensors in the earlier run; it can be read.
+  /// State of the sensor checks at the end of the earlier run; it was checked to be readable.
   std::optional<RecordingAttachment> sensor_state = {};
 };
 
 class Hub : private PipelineObserver {
  public:
   using WallTime = Publisher::WallTime;
-  /// Thousands of cycles: a hub that has not answered for this long hangs.
+  /// A hub that has not answered for this long, which is thousands of cycles, is regarded as
+  /// hanging.
   static constexpr std::chrono::seconds kHangsAfter{1};
 
   explicit Hub(HubParts parts);
@@ -73,7 +75,7 @@ class Hub : private PipelineObserver {
   Hub& operator=(const Hub&) = delete;
   ~Hub() override;
 
-  /// Runs one cycle. The hub's thread.
+  /// Runs one cycle. Only for the hub's thread.
   void cycle(WallTime wall);
   /// Runs a cycle every hub_period until stop() is called.
   void run();
@@ -83,8 +85,8 @@ class Hub : private PipelineObserver {
 
   /// Runs `task` on the hub's thread in its next cycle and returns the result. May be called from
   /// any other thread. Returns nullopt if the hub does not start the task within `time_out`; the
-  /// task then never runs. `task` must be short: parse requests before the call and format answers
-  /// after it. Objects that `task` owns are destroyed on the calling thread.
+  /// task is then not run later either. `task` must be short: parse requests before the call and
+  /// format answers after it. Objects that `task` owns are destroyed on the calling thread.
   template <class Task>
   [[nodiscard]] auto call(Task task, std::chrono::milliseconds time_out)
       -> std::optional<std::invoke_result_t<Task&>> {
@@ -93,7 +95,7 @@ class Hub : private PipelineObserver {
     return result;
   }
 
-  /// Any thread; the parts state themselves who may use them.
+  /// May be called from any thread. The comments of the parts state which threads may use them.
   [[nodiscard]] const HubParts& parts() const noexcept { return parts_; }
 
   // The following functions may be called only by tasks on the hub's thread.
@@ -117,7 +119,7 @@ class Hub : private PipelineObserver {
   HubParts parts_;
   Pipeline pipeline_;
   LiveView live_;
-  std::string touches_by_;  // the device that delivers the touches
+  std::string touches_by_;  // name of the device that delivers the touches
   Batch batch_;
   WallTime cycle_began_{};
   std::vector<StreamHealth> health_;
@@ -125,7 +127,7 @@ class Hub : private PipelineObserver {
   WallTime next_health_{};
   std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};
-  drivers::Mailbox<Call*> calls_;  // each is owned by its caller until that timed out
+  drivers::Mailbox<Call*> calls_;  // a call belongs to its caller until it has timed out
   // Calls whose caller timed out and that the hub has taken out of calls_; the next caller of
   // call() frees these calls.
   drivers::Mailbox<Call*> given_up_;

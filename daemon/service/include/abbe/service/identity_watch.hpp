@@ -1,8 +1,8 @@
 #pragma once
-/// The identity of the machine as the hub uses it: read at the start, and again every second on an
-/// ordinary thread, because `abbe machine identity` changes its file. While it is not confirmed, or
-/// the active model is that of the machine before `new`, no model is ACTIVE. Used by the hub's
-/// thread.
+/// The identity of the machine as the hub uses it. It is read at the start and then every second on
+/// an ordinary thread, because `abbe machine identity` changes its file. No model is ACTIVE while
+/// the identity is not confirmed, or while the active model belongs to the machine before `abbe
+/// machine identity new`. Used by the hub's thread.
 
 #include <chrono>
 #include <filesystem>
@@ -22,9 +22,9 @@ class IdentityWatch {
   static constexpr std::chrono::seconds kPeriod{1};
 
   struct Known {
-    std::string machine_id;             ///< empty: it could neither be read nor made
-    std::string doubt;                  ///< why no model may be ACTIVE; empty: it is confirmed
-    std::string fault;                  ///< why it could not be read or made
+    std::string machine_id;  ///< empty: the identity could neither be read nor made
+    std::string doubt;       ///< why no model may be ACTIVE; empty: the identity is confirmed
+    std::string fault;       ///< why the identity could not be read or made
     std::vector<std::string> others{};  ///< models_of_other_machine()
   };
 
@@ -36,11 +36,12 @@ class IdentityWatch {
   void follow(WallTime now);
 
   [[nodiscard]] const Known& known() const noexcept { return known_; }
-  /// Why model `id` may not be used, neither to correct nor to judge a run; empty: it may.
+  /// Why model `id` may be used neither for correction nor to judge a run; empty: it may be used.
   [[nodiscard]] std::string objection_to(const std::string& id) const;
-  /// Changes ACTIVE and DRIFT to STALE where the identity does not allow them.
+  /// Changes the status from ACTIVE or DRIFT to STALE if the identity does not allow it.
   void restrict(ActiveModelState& state) const;
-  /// Health of stream "identity". `twin`: what abbe-dds reports; empty: none.
+  /// Health of stream "identity". `twin`: text of abbe-dds about another publisher with this
+  /// identity; empty: none.
   [[nodiscard]] StreamHealth health(const std::string& twin) const;
 
  private:

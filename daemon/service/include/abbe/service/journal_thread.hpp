@@ -1,7 +1,7 @@
 #pragma once
 /// An ordinary thread that reads the state of the daemon four times a second and writes changes to
-/// the journal. A slow journal delays only this thread, because the hub merely answers a short
-/// request for its state.
+/// the journal. A slow journal delays only this thread; the hub only answers a short request for
+/// its state.
 
 #include <condition_variable>
 #include <functional>

@@ -31,8 +31,8 @@ class ModelAuthority {
  public:
   /// Loads the active model of the store, if there is one. A damaged model is reported in
   /// model_state() and not used. A store that can be neither read nor created (read-only disk,
-  /// permission, damage) is reported in fault(), and follow_store() reads it again: acquisition
-  /// does not wait for it.
+  /// permission, damage) is reported in fault(), and follow_store() tries again to read it;
+  /// acquisition does not wait for the store.
   [[nodiscard]] static ModelAuthority open(const std::filesystem::path& store_folder,
                                            const Config& config, WallClock clock,
                                            protocol::HostTime now);
@@ -44,11 +44,12 @@ class ModelAuthority {
   /// thread, because that may take long.
   void set_active(ActiveModel active);
   /// As set_active(active), for a model that another thread began to read or store when revision()
-  /// was `since`. If another model has become active since then, `active` may be the older one: it
-  /// is not used, and the next follow_store() reads the store again.
+  /// was `since`. If another model has become active since then, `active` may be the older one. It
+  /// is then not used, and the next follow_store() reads the store again.
   void set_active(ActiveModel active, std::uint64_t since);
-  /// Model `id` has drifted, if it is the active one: `drift` states what changed. For the time
-  /// until the store has recorded it, or a new model is active.
+  /// Reports that model `id` has drifted; no effect if it is not the active model. `drift` states
+  /// what changed. The report applies until the store has recorded the drift, or a new model is
+  /// active.
   void raise_drift(const std::string& id, std::string drift);
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
@@ -62,22 +63,22 @@ class ModelAuthority {
   ///   model_state() and fault(), and read again.
   Following follow_store(protocol::HostTime now);
   static constexpr std::chrono::seconds kStoreTimeout{5};
-  /// Why the store, or the model that is active in it, could not be read the last time. Empty if
-  /// both were read.
+  /// Why the last attempt to read the store, or its active model, failed. Empty if both were read.
   [[nodiscard]] const std::string& fault() const noexcept {
     return fault_.empty() ? active_.fault : fault_;
   }
 
   /// `axes_known_at`: the last time at which all axis positions were known. The model is STALE if
-  /// that is longer ago than `patience`. `why_not_known` is then added to the reason, if not empty.
+  /// this time is longer ago than `patience`; the reason then includes `why_not_known` if it is not
+  /// empty.
   [[nodiscard]] ActiveModelState model_state(protocol::HostTime now,
                                              std::optional<protocol::HostTime> axes_known_at,
                                              std::chrono::nanoseconds patience,
                                              std::string_view why_not_known = {}) const;
   [[nodiscard]] const PublishedModel* active_model() const noexcept { return active_.model.get(); }
-  /// The model with which the gate compares a new one: the active model, or null if the active
-  /// model was made for another machine configuration, or the identity of the machine does not
-  /// allow to use it.
+  /// The model with which the gate compares a new one: the active model. Null if the active model
+  /// was made for another machine configuration, or if the identity of the machine does not allow
+  /// its use.
   [[nodiscard]] std::shared_ptr<const PublishedModel> comparison_model() const;
   /// Restricts comparison_model(). `identity` must exist at every later call; null: no restriction.
   void set_identity(const IdentityWatch* identity) noexcept { identity_ = identity; }
@@ -109,7 +110,7 @@ class ModelAuthority {
   std::string fault_;
   protocol::HostTime next_repair_{};
   std::uint64_t revision_ = 0;
-  std::uint64_t looking_since_ = 0;  // revision_ when the reading began
+  std::uint64_t looking_since_ = 0;  // revision_ at the time when the reading began
   protocol::HostTime looking_from_{};
   std::future<Result<Look>> looking_;
 };

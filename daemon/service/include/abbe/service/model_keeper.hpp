@@ -28,9 +28,9 @@ namespace abbe::daemon {
 struct ActiveModel {
   StoreEvent activation;  ///< default-constructed: no model has been activated
   std::shared_ptr<const PublishedModel> model;
-  ModelPublication publication;  ///< of `model`
-  /// Why the readings do not have the meaning that they had when the model was made; empty: they
-  /// have, or a person accepted it.
+  ModelPublication publication;  ///< encoded messages of `model`
+  /// Why the readings do not have the meaning that they had when the model was made. Empty: they
+  /// have this meaning, or a person accepted the model for this configuration.
   std::string unfit{};
   std::string measured_otherwise{};  ///< changed_measurements()
   std::string recording_gap;         ///< ModelDocument::recording_gap
@@ -41,17 +41,17 @@ struct ActiveModel {
 /// Result of storing a model.
 struct KeptModel {
   std::string id;
-  /// the model that is active after the call; nullopt: the gate refused the given model, or it is
-  /// held ([drift] hold)
+  /// The model that is active after the call. nullopt: the gate refused the given model, or it is
+  /// not activated because of [drift] hold.
   std::optional<ActiveModel> active;
 };
 
-/// What is stored beside an identified model.
+/// Data that are stored together with an identified model.
 struct KeptBeside {
   /// The active model with which the run was compared, and what changed since; empty: no drift.
   std::string drifted_model{}, drift{};
   bool hold = false;  ///< do not activate the model, although the gate accepts it
-  /// The model of the run alone, if the identified model is an update with it.
+  /// If the identified model is an update of the active model: the model of the run alone.
   std::optional<ModelDocument> run{};
   bool run_accepted = false;
   std::vector<std::string> run_reasons{};
@@ -76,8 +76,8 @@ class ModelKeeper {
   ///
   /// A drift is recorded before the activation.
   ///
-  /// After an error the call may be repeated with the same `actor`: entries that the store already
-  /// has are not made twice. Stops with Refused as soon as `discarded` is true; `discarded` may be
+  /// After an error the call may be repeated with the same `actor`; entries that the store already
+  /// has are not added again. Returns Refused as soon as `discarded` is true; `discarded` may be
   /// null.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
                                        const StoreActor& actor, protocol::HostTime now,

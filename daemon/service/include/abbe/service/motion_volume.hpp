@@ -2,8 +2,9 @@
 /// The places to which abbed may send a measuring machine. Every request that could become a motion
 /// is checked here, as a whole, before any part of it is sent: the places on the way to a touch,
 /// the touch itself and the way out. The volume is a box, so that a straight line between two
-/// places in it stays in it. Not checked: where PtMeas leads the tip from the place that was sent
-/// (approach, search and retract distances of the controller).
+/// places in it stays in it. The additional motion of the command PtMeas is not checked: the
+/// controller moves the tip by its approach, search and retract distances from the point that was
+/// sent.
 
 #include <array>
 #include <span>
@@ -33,8 +34,8 @@ struct MotionVolume {
 [[nodiscard]] MotionVolume motion_volume(const Config& config);
 
 /// Refused if a coordinate is not finite or outside the volume, or if the normal of a touch is not
-/// a unit vector. The text names the first such point, axis, value and limit, and the number of
-/// all.
+/// a unit vector. The text names the first such point, axis, value and limit, and the number of all
+/// such points.
 [[nodiscard]] Result<void> check_places(const MotionVolume& volume,
                                         std::span<const TouchRequest> touches,
                                         std::span<const drivers::ProbePoint> leave);

@@ -1,6 +1,6 @@
 #pragma once
-/// What signals and uncaught exceptions do to abbed. The rule: nothing that can be caught ends
-/// abbed while a measuring machine moves without AbortE.
+/// How abbed handles signals and uncaught exceptions. The rule: if a signal or exception that can
+/// be caught ends abbed while a measuring machine moves, abbed sends AbortE first.
 ///
 /// | | |
 /// | --- | --- |
@@ -22,11 +22,11 @@ namespace abbe::daemon {
 [[nodiscard]] sigset_t prepare_signals();
 
 /// Sends AbortE to every machine that moves, without its device thread, and waits at most 0.5 s for
-/// the answer. A line for stderr about each of them; empty: none moves. For an end that cannot wait
-/// for the device threads.
+/// the answer. Returns a line for stderr about each of them; empty: none moves. Used when the
+/// process ends without waiting for the device threads.
 [[nodiscard]] std::string stop_machines_at_once() noexcept;
 
-/// "SIGHUP"
+/// The name of the signal: "SIGHUP".
 [[nodiscard]] std::string signal_name(int number);
 
 }  // namespace abbe::daemon

@@ -6,8 +6,8 @@
 
 namespace abbe::daemon {
 
-/// From twice the period in which chunks are written; empty: none. The text does not change every
-/// second.
+/// The warning if `behind` is at least twice the period in which chunks are written; else empty.
+/// The text does not change every second.
 [[nodiscard]] std::string text_of_lag(std::chrono::nanoseconds behind,
                                       std::chrono::nanoseconds chunk_period);
 

@@ -22,7 +22,7 @@ class ReferenceService : public PipelineObserver {
  public:
   struct AxisStatus {
     std::string name;
-    AxisReference found;           ///< of the running session, or of the latest
+    AxisReference found;           ///< result of the running or latest session
     double reading_at_zero = 0.0;  ///< in state Found: reading at count 0, m or rad
     bool known = false;            ///< the axis is referenced now
   };
@@ -41,7 +41,7 @@ class ReferenceService : public PipelineObserver {
   /// not positive. Refused while a calibration takes readings, without a recent sample, and unless
   /// the axes have stood for half a second.
   [[nodiscard]] Result<void> set_zero_here(const SetZeroHere& here);
-  /// While a search is running, passes the samples of the batch to it.
+  /// Passes the samples of the batch to the search while one is running.
   void on_delivered(const Batch& batch) override;
   /// The zero of every axis, for the pipeline.
   [[nodiscard]] AxisZeros& zeros() noexcept { return zeros_; }
@@ -57,9 +57,9 @@ class ReferenceService : public PipelineObserver {
   [[nodiscard]] bool configured() const noexcept { return marks_ != nullptr; }
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] std::vector<AxisStatus> status() const;
-  /// Axes of the counter card that are not referenced now.
+  /// Names of the axes of the counter card that are not referenced now.
   [[nodiscard]] std::vector<std::string> unknown() const;
-  /// Axes of unknown() that have no reference marks.
+  /// Names of the axes in unknown() that have no reference marks.
   [[nodiscard]] std::vector<std::string> without_zero() const;
 
  private:
@@ -84,14 +84,15 @@ class ReferenceService : public PipelineObserver {
     std::int64_t count = 0;
     protocol::HostTime since{};
   };
-  std::vector<Standing> standing_;  ///< in the order of the counted axes
-  protocol::HostTime newest_{};     ///< time of the newest live sample
+  /// duration of standstill of each axis, in the order of the counted axes
+  std::vector<Standing> standing_;
+  protocol::HostTime newest_{};  ///< time of the newest live sample
   std::optional<protocol::AxisSample> latest_;
   protocol::HostTime from_{};  ///< start of the search: only later marks are used
   std::optional<Counting> left_;
   std::vector<std::string> carried_on_;
   protocol::HostTime restarted_at_{};       ///< time of the sample that showed a counter restart
-  std::optional<CountingProgress> coming_;  ///< newer than the newest sample
+  std::optional<CountingProgress> coming_;  ///< state that is newer than the newest sample
   std::optional<CountingProgress> progress_;
 };
 

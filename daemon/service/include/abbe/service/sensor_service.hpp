@@ -1,6 +1,6 @@
 #pragma once
-/// Takes the statement of a person that a sensor is right, records it, and hands it to the next
-/// cycle of the hub. The hub's thread.
+/// Takes the statement of a person that a sensor is correct, records it, and passes it to the next
+/// cycle of the hub. Used by the hub's thread.
 
 #include <string>
 #include <utility>
@@ -17,8 +17,8 @@ class SensorService {
  public:
   explicit SensorService(RecorderThread* recorder) : recorder_(recorder) {}
 
-  /// `acquiring`: a calibration takes readings; a sensor must not change its meaning meanwhile.
-  /// Usage or Refused with the reason.
+  /// `acquiring`: a calibration takes readings. The sensor must not be accepted meanwhile, because
+  /// its values would change. Usage or Refused with the reason.
   [[nodiscard]] Result<void> accept(const LiveView& live, SensorAcceptance acceptance,
                                     bool acquiring);
   /// The statements since the last call.

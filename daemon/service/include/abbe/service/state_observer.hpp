@@ -46,7 +46,7 @@ struct Observed {
   std::vector<StreamHealth> streams;
   SessionStatus session;
   ObservedModel model;
-  std::optional<ObservedStop> stop = {};  ///< once its outcome is known
+  std::optional<ObservedStop> stop = {};  ///< set once the outcome of the stop is known
   std::optional<ObservedParticipant> participant = {};
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 /// Changes which model of the store is active, for clients that may not write to the store. A
-/// change runs on an ordinary thread, because the store's lock may be held by another process: a
-/// request, for example a stop, must not wait for it. One change at a time. Thread-safe.
+/// change runs on an ordinary thread: another process may hold the store's lock, and other requests
+/// (for example a stop) must not wait for it. Only one change runs at a time. Thread-safe.
 
 #include <chrono>
 #include <cstdint>
@@ -19,13 +19,13 @@
 namespace abbe::daemon {
 
 struct Activation {
-  std::string id;        ///< or a beginning of it that no other model has
+  std::string id;        ///< id of the model, or a beginning of it that no other model has
   std::string who, why;  ///< kept in the store
-  bool force = false;    ///< also a model that the gate refused; needs `why`
+  bool force = false;    ///< true: also activate a model that the gate refused; needs `why`
 };
 
 struct RollBack {
-  std::string active;    ///< the id of the model that the client takes for the active one
+  std::string active;    ///< id of the model that the client assumes to be active
   std::string who, why;  ///< kept in the store
 };
 
@@ -36,12 +36,13 @@ class StoreChanges {
   /// Begins a change and returns its number. Usage for a forced activation without reason; Refused
   /// while another change runs.
   [[nodiscard]] Result<std::uint64_t> activate(Activation asked);
-  /// The same for the model that was active before `active`; the outcome is Refused if another
-  /// model than `active` is active.
+  /// Begins to activate the model that was active before `active`. The outcome is Refused if a
+  /// model other than `active` is active.
   [[nodiscard]] Result<std::uint64_t> roll_back(RollBack asked);
 
-  /// Waits at most `patience` for the change. The id of the model that is active then, or the Error
-  /// of the store; nullopt while the change runs. Usage for another number than the last one.
+  /// Waits at most `patience` for the end of the change. Returns the id of the model that is then
+  /// active, or the Error of the store; nullopt while the change runs. Usage for a number other
+  /// than that of the last change.
   [[nodiscard]] std::optional<Result<std::string>> outcome(std::uint64_t number,
                                                            std::chrono::milliseconds patience);
 

@@ -47,9 +47,10 @@ class TouchService {
   struct Status {
     bool running = false;
     std::size_t asked = 0;
-    std::vector<protocol::ProbeTrigger> touches;  ///< with a position, in the order asked
-    std::string reason;  ///< why it ended before the last touch; empty: it did not
-    /// Whether the machine stopped, if the job was cancelled and has ended.
+    /// touches with their position, in the requested order
+    std::vector<protocol::ProbeTrigger> touches;
+    std::string reason;  ///< why the job ended before the last touch; empty: it did not
+    /// Outcome of the stop, if the job was cancelled and has ended.
     drivers::IppStop stop = {};
   };
 
@@ -63,7 +64,8 @@ class TouchService {
   /// ready. Afterwards `job` holds the memory of the previous job, which the caller destroys.
   [[nodiscard]] Result<void> start(TouchJob&& job);
   /// Stops the present motion. The job counts as running until the machine has stopped, or until it
-  /// is known that this cannot be confirmed; the reason and `stop` of the status report which.
+  /// is known that the stop cannot be confirmed. The reason and `stop` of the status report the
+  /// outcome.
   [[nodiscard]] Result<void> cancel();
   /// Call in every cycle. `points_left`: SampleSource::points_left() before the batch was drained.
   /// `seen`: the last fault that the machine reported. Acts as cancel() if look() was not called
@@ -93,9 +95,10 @@ class TouchService {
   std::vector<drivers::ProbePoint> leave_;
   bool leaving_ = false;
   bool stopping_ = false;
-  std::uint64_t stop_number_ = 0;   ///< of stop_machine()
-  bool refused_ = false;            ///< the machine refused the present touch
-  std::optional<WallTime> looked_;  ///< time of the last look(); nullopt: since the last cycle
+  std::uint64_t stop_number_ = 0;  ///< number that stop_machine() returned
+  bool refused_ = false;           ///< the machine refused the present touch
+  /// time of the last call of look(); nullopt: it was called since the last cycle
+  std::optional<WallTime> looked_;
   Status status_;
 };
 

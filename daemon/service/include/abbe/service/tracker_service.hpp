@@ -26,7 +26,7 @@ class TrackerService {
     drivers::TrackerOrder asked;
     std::string by;  ///< user who sent the order
     protocol::HostTime since{};
-    std::optional<drivers::TrackerOrderReport> report;  ///< nullopt: the order runs
+    std::optional<drivers::TrackerOrderReport> report;  ///< nullopt: the order is still running
   };
   /// Input of start() besides the order.
   struct Asked {
@@ -46,7 +46,7 @@ class TrackerService {
   /// Takes the reports of the tracker's thread. Call in every cycle.
   void cycle(protocol::HostTime now);
 
-  /// Oldest first.
+  /// The orders that are kept, oldest first.
   [[nodiscard]] const std::deque<Order>& orders() const noexcept { return orders_; }
   /// The running order; null: none.
   [[nodiscard]] const Order* running() const noexcept;

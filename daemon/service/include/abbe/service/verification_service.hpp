@@ -18,7 +18,8 @@ namespace abbe::daemon {
 
 class VerificationService {
  public:
-  /// Most standstills of one verification: four hours with one every 1.5 s; 1.2 MB.
+  /// Most standstills of one verification: enough for four hours with one standstill every 1.5 s;
+  /// 1.2 MB of memory.
   static constexpr std::size_t kMostPoints = 10'000;
 
   explicit VerificationService(const Config& config) : config_(config) {}
@@ -29,7 +30,7 @@ class VerificationService {
   [[nodiscard]] Result<void> end(std::uint64_t number);
   /// The points so far. Refused after another verification was begun.
   [[nodiscard]] Result<const StandstillPoints*> points(std::uint64_t number) const;
-  /// Why no more points are taken although end() was not called; empty: points are taken.
+  /// Why no more points are taken although end() was not called; empty: points are still taken.
   [[nodiscard]] std::string stopped() const;
   /// The name of the machine in the configuration.
   [[nodiscard]] const std::string& machine() const noexcept { return config_.machine.name; }

@@ -1,5 +1,5 @@
 #pragma once
-/// TOML with the limits of sections, with errors of the daemon.
+/// Parses TOML with the limits defined in sections; faults are errors of the daemon.
 
 #include <toml++/toml.h>
 #include <cstddef>
@@ -18,11 +18,11 @@ using sections::TomlBounds;
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file,
                                              const TomlBounds& bounds = {});
 
-/// A file that a person wrote has fewer faults than this; the limit shortens the list for a file
-/// that is not a configuration at all.
+/// A file that a person has written has fewer faults than this. The limit shortens the list for a
+/// file that is not a configuration at all.
 inline constexpr std::size_t kMostConfigFaults = 1000;
 
-/// Io if the file cannot be read.
+/// The text of the file. Io if it cannot be read.
 [[nodiscard]] Result<std::string> read_configuration_text(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

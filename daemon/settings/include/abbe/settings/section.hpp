@@ -1,5 +1,6 @@
 #pragma once
-/// The reader of one table of a TOML file, defined in sections, as names of this namespace.
+/// The reader of one table of a TOML file. It is defined in sections; this header makes the names
+/// known in this namespace.
 
 #include "abbe/base/faults.hpp"
 #include "abbe/sections/section.hpp"

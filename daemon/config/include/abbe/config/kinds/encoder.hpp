@@ -33,7 +33,7 @@ struct EncoderNodeConfig {
   int position_byte = 0;  ///< in the TPDO; External only, else read from the node
   /// Rotary: counts per revolution, after which the count wraps to 0. 0: read from the node.
   std::int64_t wrap_counts = 0;
-  std::optional<double> middle;  ///< rotary: of the travel of the axis, rad
+  std::optional<double> middle;  ///< of a rotary axis: middle of its travel, rad
 };
 
 struct EncoderConfig {

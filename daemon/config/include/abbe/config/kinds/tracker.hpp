@@ -27,19 +27,21 @@ enum class TrackerModeConfig { Continuous, Stationary };
 /// How the tracker searches its reflector. One command of emScon sets both values.
 struct TrackerSearchConfig {
   double radius_m = 0.0;
-  std::chrono::nanoseconds timeout{};  ///< whole ms
+  std::chrono::nanoseconds timeout{};  ///< time-out of the search; a whole number of ms
 };
 
 struct TrackerConfig {
   static const ConfigKind kKind;
   std::string name = "tracker";
-  /// The points come as lines of text; `host`, `port` and what emScon alone has are not used.
+  /// Set if the points come as lines of text. `host`, `port` and the members that only emScon uses
+  /// are then not used.
   std::optional<LinesConfig> lines;
   std::string host;
   std::uint16_t port = 700;
   TrackerModeConfig mode = TrackerModeConfig::Continuous;
-  double point_rate_hz = 500.0;                                              ///< mode Continuous
-  std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< per mean; whole ms
+  double point_rate_hz = 500.0;  ///< only in mode Continuous
+  /// duration of the measurement of one mean value; a whole number of ms
+  std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};
   WeatherConfig weather = WeatherConfig::Compute;
   /// Relative standard uncertainty common to all distances of the tracker. Default:
   /// - weather = "compute": 2e-7, from the controller's own sensors (0.2 K and 30 Pa);
@@ -54,9 +56,10 @@ struct TrackerConfig {
   std::chrono::nanoseconds connect_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
-  /// During a measurement, no data for a longer time than this is a fault.
+  /// It is a fault if no data come for longer than this during a measurement.
   std::chrono::nanoseconds silence_timeout{std::chrono::milliseconds{1500}};
-  std::string reflector;  ///< name or id in the controller's list; empty: the current one
+  /// name or id in the controller's list; empty: the reflector that is set there
+  std::string reflector;
   /// The tracker moves its beam to the home position (bird bath) after Initialize.
   bool home_after_initialize = false;
   /// Search around the direction of the beam. nullopt: the controller's settings are not changed.

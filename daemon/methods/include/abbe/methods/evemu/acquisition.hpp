@@ -1,9 +1,9 @@
 #pragma once
-/// Collects the touches of one calibration with a ball array, and tells which ball or block to
-/// touch next. calib's TouchGuide assigns touches to balls and blocks. This class rejects unusable
-/// touches, with device and reason, and ends the run when touches stop arriving. The decisions
-/// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
-/// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
+/// Collects the touches of one calibration with a ball array, and states which ball or block must
+/// be touched next. calib's TouchGuide assigns touches to balls and blocks. This class rejects
+/// unusable touches, with device and reason, and ends the run when touches stop arriving. The
+/// decisions depend on snapshots only, so that a replay uses exactly the same touches; only tick()
+/// receives the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
 #include <array>
 #include <memory>
@@ -55,7 +55,7 @@ struct EvemuAcquisitionOptions {
   /// Source of the temperature of the array. A touch is not used if the sensor has no valid value
   /// at its instant, because the identification needs the temperature.
   std::optional<ArtefactTemperatureConfig> artefact{};
-  std::string artefact_sensor{};  ///< name of the temperature
+  std::string artefact_sensor{};  ///< name of that temperature sensor
 };
 
 class EvemuAcquisition {
@@ -66,7 +66,7 @@ class EvemuAcquisition {
   [[nodiscard]] static Result<EvemuAcquisition> create(EvemuRequest request,
                                                        EvemuAcquisitionOptions options = {});
 
-  /// To be called before the first take(). Touches before `from` are ignored.
+  /// Call it before the first take(). Touches before `from` are ignored.
   void begin(protocol::HostTime from) noexcept { intake_.begin(from); }
 
   void take(const protocol::Snapshot& snapshot);
@@ -97,7 +97,7 @@ class EvemuAcquisition {
   TouchIntake intake_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
-  std::shared_ptr<const std::vector<FeatureToTouch>> features_;  ///< made again after each touch
+  std::shared_ptr<const std::vector<FeatureToTouch>> features_;  ///< rebuilt after each touch
 };
 
 }  // namespace abbe::daemon

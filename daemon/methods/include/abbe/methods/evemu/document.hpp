@@ -15,7 +15,8 @@ namespace abbe::daemon {
                                            const Config& config, std::vector<InputFile> inputs,
                                            protocol::UtcTime created);
 
-/// The same with what the run left: verdict, residuals, places of the balls (RunFigures).
+/// Same as the function above, with the figures of the run in addition: verdict, residuals, places
+/// of the balls (RunFigures).
 [[nodiscard]] ModelDocument evemu_document(const EvemuCandidate& candidate, const Config& config,
                                            std::vector<InputFile> inputs,
                                            protocol::UtcTime created);

@@ -21,25 +21,26 @@ struct EvemuCandidate {
   calib::Verdict verdict;
 };
 
-/// What an identification needs of the touches of an array: live, replayed or from files.
+/// Input of an identification from touches of an array. The touches are live, replayed or from
+/// files.
 struct EvemuTask {
   calib::evemu::Observations observations;
   calib::evemu::JudgeOptions judging;
   std::optional<RotationPoints> rotation_reference{};  ///< points where V is known
 };
-/// The observations of an acquired run. `order`, `positions`: without a value those of [evemu] and
-/// of the request.
+/// The observations of an acquired run. If `order` or `positions` has no value, the order of
+/// [evemu] and the positions of the request are used.
 [[nodiscard]] Result<calib::evemu::Observations> evemu_observations(
     const EvemuRun& run, const Config& config, std::optional<int> order = {},
     std::optional<int> positions = {});
 
-/// Of [evemu] and [gate].
+/// The options of the judgement from [evemu] and [gate].
 [[nodiscard]] calib::evemu::JudgeOptions evemu_judge_options(const Config& config);
 
-/// Identifies and judges. `active`: the active model, with which the gate compares; null if there
-/// is none. An Error DataInsufficient or BadInput names the position and number of the touches that
-/// caused it. A model whose rotation about Ball1 is not known is refused as "shape only" unless
-/// [gate] accepts "evemu-shape-only".
+/// Identifies a model and judges it. `active`: the active model, with which the gate compares; null
+/// if there is none. An Error DataInsufficient or BadInput names the position and number of the
+/// touches that caused it. A model whose rotation about Ball1 is not known is refused as "shape
+/// only" unless [gate] accepts "evemu-shape-only".
 [[nodiscard]] Result<EvemuCandidate> identify_with_array(EvemuTask task,
                                                          const calib::VolumetricModel* active);
 
@@ -49,9 +50,9 @@ struct EvemuTask {
 /// coefficient of the array is known.
 [[nodiscard]] Result<void> check_evemu(const EvemuRequest& request, const Config& config);
 /// Checks that the expansion coefficient and the temperature of the array are given both or not at
-/// all. Returns a message, empty if the check passed. `named`: the calibrator in the message.
-/// `thermometer`: the source of the temperature in the message; empty: there is none. `remedy`: how
-/// to give the temperature.
+/// all. Returns a message, empty if the check passed. The other arguments are parts of the message.
+/// `named`: name of the calibrator. `thermometer`: source of the temperature; empty: there is none.
+/// `remedy`: how the user can give the temperature.
 [[nodiscard]] std::string artefact_temperature_fault(const calib::evemu::Calibrator& calibrator,
                                                      std::string_view named,
                                                      std::string_view thermometer,

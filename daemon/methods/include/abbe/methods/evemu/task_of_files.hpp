@@ -1,5 +1,5 @@
 #pragma once
-/// The request for a calibration with a ball array, from the files of a client.
+/// Makes the request for a calibration with a ball array from the files of a client.
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -7,9 +7,9 @@
 
 namespace abbe::daemon {
 
-/// The request without the numbers of positions and points, which abbed takes from [evemu].
-/// `reference`: points where V is known independently, null: none; `u_reference_m`: the standard
-/// uncertainty of that V, per component.
+/// The request without the numbers of positions and points; abbed takes these from [evemu].
+/// `reference`: points where V is known independently; null: none. `u_reference_m`: standard
+/// uncertainty of this V, per component.
 [[nodiscard]] nlohmann::json evemu_task(const CalibratorFile& calibrator,
                                         const BallErrorsFile* reference, double u_reference_m);
 

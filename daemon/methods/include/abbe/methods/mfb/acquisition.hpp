@@ -1,8 +1,8 @@
 #pragma once
-/// Collects the touches of one calibration with a Multi-Feature Bar, and tells which feature to
-/// touch next. calib's TouchGuide assigns touches to their places. This class rejects unusable
+/// Collects the touches of one calibration with a Multi-Feature Bar, and states which feature must
+/// be touched next. calib's TouchGuide assigns touches to their places. This class rejects unusable
 /// touches, with device and reason, and ends the run when touches stop arriving. The decisions
-/// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
+/// depend on snapshots only, so that a replay uses exactly the same touches; only tick() receives
 /// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
 #include <array>
@@ -22,16 +22,16 @@
 
 namespace abbe::daemon {
 
-/// Request for a calibration with a bar. The files are contained as text, so that a replay reads
-/// the same.
+/// Request for a calibration with a bar. It contains the text of the files, so that a replay reads
+/// the same text.
 struct MfbRequest {
   struct File {
     std::string name;
     std::string text;
   };
   File bar, plan;  ///< bar.toml, plan.toml
-  /// Readings of the touches that earlier sessions took, in their order; the session continues
-  /// after the last one.
+  /// Readings of the touches of earlier sessions, in the order in which they were taken. The
+  /// session continues after the last one.
   std::vector<calib::Vector3> earlier_m;
 };
 
@@ -40,18 +40,19 @@ struct MfbRun {
   calib::mfb::Plan plan;
   std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
   std::vector<InputFile> sources;
-  /// Host times of the first and the last touch; nullopt: not known, for the touches of earlier
-  /// sessions come without times.
+  /// Host times of the first and the last touch. nullopt: not known, because touches of earlier
+  /// sessions have no times.
   std::optional<std::array<protocol::HostTime, 2>> observed{};
 };
 
 struct MfbAcquisitionOptions {
   TouchRules touches{};
-  /// Sensor on the bar. A touch is not used if it has no valid value at its instant. nullopt:
-  /// plan.toml states the temperatures.
+  /// Temperature sensor on the bar. A touch is not used if the sensor has no valid value at its
+  /// instant. nullopt: plan.toml states the temperatures.
   std::optional<ArtefactTemperatureConfig> bar{};
-  std::string bar_sensor{};  ///< name of the temperature
-  /// Error: the configuration describes no machine that can be calibrated with a bar.
+  std::string bar_sensor{};  ///< name of the temperature sensor
+  /// Machine model of the configuration. An Error if it is not a machine that can be calibrated
+  /// with a bar.
   Result<calib::mfb::MfbMachine> machine = fail(ErrorCode::Refused, "no machine is configured");
 };
 
@@ -59,12 +60,13 @@ class MfbAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// Creates the acquisition and takes the earlier touches. BadInput for an invalid bar or plan,
-  /// with file, line and key, for one outside the travel, and for earlier touches of another bar.
+  /// Creates the acquisition and takes the earlier touches. BadInput, with file, line and key, for
+  /// an invalid bar or plan. BadInput also for a bar position outside the travel, and for earlier
+  /// touches that belong to another bar.
   [[nodiscard]] static Result<MfbAcquisition> create(const MfbRequest& request,
                                                      MfbAcquisitionOptions options);
 
-  /// To be called before the first take(). Touches before `from` are ignored.
+  /// Call it before the first take(). Touches before `from` are ignored.
   void begin(protocol::HostTime from) noexcept { intake_.begin(from); }
 
   void take(const protocol::Snapshot& snapshot);
@@ -79,17 +81,19 @@ class MfbAcquisition {
   [[nodiscard]] std::optional<RequestedTouch> next() const;
   /// Remarks on touches since the last call, one sentence each.
   [[nodiscard]] std::vector<std::string> take_notes() { return intake_.take_notes(); }
-  /// Readings of all touches taken so far, in their order.
+  /// Readings of all touches so far, in the order in which they were taken.
   [[nodiscard]] std::vector<calib::Vector3> readings_m() const;
-  /// With a sensor on the bar, the plan of the run has the mean temperature of each pass instead of
-  /// the stated one, with its uncertainty. A pass that only earlier sessions touched keeps the
-  /// stated one, and the uncertainty common to all passes is then the larger of both.
+  /// Ends the acquisition and returns the run. With a sensor on the bar, the plan of the run
+  /// contains the measured mean temperature of each pass and its uncertainty, instead of the stated
+  /// temperature. A pass that was touched only in earlier sessions keeps the stated temperature;
+  /// the uncertainty common to all passes is then the larger of the two.
   [[nodiscard]] MfbRun release();
 
  private:
   MfbAcquisition(calib::mfb::Bar bar, std::vector<InputFile> sources, calib::mfb::TouchGuide guide,
                  MfbAcquisitionOptions options);
-  /// The temperature of the bar at a touch; nullopt: no valid value. Without a sensor: 0.
+  /// The temperature of the bar at a touch. nullopt: the sensor has no valid value. Without a
+  /// sensor the result is 0.
   [[nodiscard]] std::optional<double> temperature_at(const protocol::Snapshot& touch) const;
   calib::mfb::GuidedTouch take_at(const calib::Vector3& reading_m, double temperature_K);
   [[nodiscard]] calib::mfb::Plan plan_as_measured() const;
@@ -104,7 +108,7 @@ class MfbAcquisition {
   std::vector<std::vector<double>> temperature_K_;
   MfbAcquisitionOptions options_;
   TouchIntake intake_;
-  bool has_earlier_ = false;  // touches of earlier sessions
+  bool has_earlier_ = false;  // the run contains touches of earlier sessions
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
 };

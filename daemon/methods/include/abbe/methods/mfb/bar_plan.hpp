@@ -1,5 +1,5 @@
 #pragma once
-/// What `abbe plan mfb` writes and prints: plan.toml and the figures of the plan. Pure.
+/// The output of `abbe plan mfb`: plan.toml and the figures of the plan. Pure.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -13,26 +13,27 @@ namespace abbe::daemon {
 
 /// A planned calibration with a Multi-Feature Bar.
 struct BarPlan {
-  std::string set;  ///< "rolled", or the name of the file that was judged
+  std::string set;  ///< "rolled", or the name of the file with the set of positions that was judged
   calib::mfb::Plan plan;
   calib::mfb::PlanPrediction prediction;
   calib::mfb::ReadingRange readings;
   double duration_s = 0.0;
-  /// With rotary axes, one for each position; else empty.
+  /// The indexed positions, one per bar position, of a machine with rotary axes; else empty.
   std::vector<calib::mfb::IndexedPosition> indexed;
-  /// Of the set whose positions were exchanged.
+  /// Prediction for the initial set, from which positions were exchanged.
   std::optional<calib::mfb::PlanPrediction> start;
   std::vector<std::string> notes;
-  std::vector<std::string> missing;  ///< measurements that the styli do not permit
+  std::vector<std::string> missing;  ///< measurements that are not possible with the styli
 
   [[nodiscard]] std::size_t positions() const;
-  /// Passes in one direction.
+  /// Number of measurements: passes in one direction.
   [[nodiscard]] std::size_t measurements() const;
-  /// Clampings of the bar.
+  /// Number of times the bar is clamped.
   [[nodiscard]] std::size_t clampings() const;
 };
 
-/// The file as read_bar_plan_toml() reads it, with comments for people. `machine`: its name.
+/// The text of plan.toml in the form that read_bar_plan_toml() reads, with comments for people.
+/// `machine`: name of the machine.
 [[nodiscard]] std::string to_plan_toml(const BarPlan& plan, const calib::mfb::Bar& bar,
                                        const std::string& machine);
 [[nodiscard]] nlohmann::json bar_plan_json(const BarPlan& plan, const calib::mfb::Bar& bar);

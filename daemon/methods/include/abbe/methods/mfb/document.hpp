@@ -10,7 +10,7 @@
 
 namespace abbe::daemon {
 
-/// "hole", "rod" or "plane", as in the file of touches.
+/// The name of the feature in the file of touches: "hole", "rod" or "plane".
 [[nodiscard]] std::string_view name(calib::mfb::Feature feature);
 
 [[nodiscard]] ModelDocument mfb_document(const MfbCandidate& candidate,

@@ -1,5 +1,6 @@
 #pragma once
-/// An identification with a Multi-Feature Bar as it is judged, stored and reported.
+/// Identification with a Multi-Feature Bar: its input, and the judged result that is stored and
+/// reported.
 
 #include <functional>
 #include <optional>
@@ -14,13 +15,13 @@
 
 namespace abbe::daemon {
 
-/// What was measured, and how it is identified.
+/// The measured touches, and how the model is identified from them.
 struct MfbTask {
   calib::mfb::Bar bar;
   calib::mfb::Plan plan;
   std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
   calib::mfb::Options options;
-  /// Without: the uncertainties of the first order are not checked.
+  /// Options of the Monte Carlo check of the first-order uncertainties; nullopt: no check.
   std::optional<calib::mfb::MonteCarloOptions> monte_carlo{};
 };
 
@@ -33,9 +34,10 @@ struct MfbCandidate {
 
 using MfbProgress = std::function<void(std::string_view step, double share)>;
 
-/// `task`: bar and plan are valid, so that an error of the identification is one of the data:
-/// DataInsufficient. `active`, the model in use, may be null. `progress`: called
-/// with the name of each step and its share done.
+/// Identifies a model and judges it. `task` has a valid bar and plan; an error of the
+/// identification is therefore caused by the data and is DataInsufficient. `active`: the model in
+/// use; may be null. `progress` is called with the name of each step and the fraction of it that is
+/// done.
 [[nodiscard]] Result<MfbCandidate> identify_with_bar(const MfbTask& task, const Config& config,
                                                      const calib::VolumetricModel* active,
                                                      const MfbProgress& progress = {});

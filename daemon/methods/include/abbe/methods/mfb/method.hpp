@@ -24,17 +24,18 @@ struct MfbMethod {
   using Run = MfbRun;
   using Candidate = MfbCandidate;
 
-  /// No axis readings with a measuring machine: it reports the position of each touch.
+  /// Devices that the method reads. With a measuring machine no axis readings are needed, because
+  /// it reports the position of each touch.
   [[nodiscard]] static MethodNeeds needs(const Config& config);
   [[nodiscard]] static Options options(const Config& config);
-  /// {"bar": {"file", "text"}, "plan": {"file", "text"}, "earlier_m": [[x, y, z] ..]}
+  /// Writes {"bar": {"file", "text"}, "plan": {"file", "text"}, "earlier_m": [[x, y, z] ..]}.
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
-  /// "earlier_m" may be missing. Throws nlohmann::json::exception for a member that is missing or
-  /// of the wrong type.
+  /// Reads the object that to_json() writes. "earlier_m" may be missing. Throws
+  /// nlohmann::json::exception for another member that is missing, or for one of the wrong type.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
-  /// Refused: no source of touches, a machine that corrects its positions, too few nodes. BadInput:
-  /// bar, plan or earlier touches are not valid, or the plan does not show all errors; the text
-  /// names file and line or the errors.
+  /// Refused: there is no source of touches, the machine corrects its positions, or there are too
+  /// few nodes. BadInput: bar, plan or earlier touches are invalid, or the plan does not determine
+  /// all errors. The text names file and line, or the errors.
   [[nodiscard]] static Result<void> check(const Request& request, const Config& config);
   [[nodiscard]] static Result<Acquisition> acquire(Request&& request, const Options& options);
   [[nodiscard]] static Run run_of(Acquisition&& acquisition);

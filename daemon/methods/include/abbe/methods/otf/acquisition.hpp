@@ -55,7 +55,7 @@ class RunPoints {
 
   [[nodiscard]] std::size_t full_chunks() const noexcept { return size_ / kPointsInChunk; }
   [[nodiscard]] const Chunk& full_chunk(std::size_t i) const { return chunks_[i]; }
-  /// The points behind the full chunks.
+  /// The points after the last full chunk.
   [[nodiscard]] std::vector<RunPoint> tail() const;
 
  private:
@@ -66,17 +66,17 @@ class RunPoints {
   std::size_t size_ = 0;
 };
 
-/// The machine has reached a leg of the path, or has driven it between two tracker points. Several
-/// legs then have the same point.
+/// The machine has reached a leg of the path, or has travelled the whole leg between two tracker
+/// points. In the second case several legs have the same point.
 struct LegBegun {
   AxisPosition from_m{}, to_m{};      ///< vertices of the request
   std::size_t first_point = 0;        ///< number of the point in the run
-  AxisPosition q_m{}, p_tracker_m{};  ///< readings and tracker at this point
+  AxisPosition q_m{}, p_tracker_m{};  ///< readings and tracker position at this point
 };
 
 /// What was added to a run since the last call of OtfAcquisition::take_news().
 struct RunNews {
-  std::vector<RunPoints::Chunk> chunks;  ///< full ones
+  std::vector<RunPoints::Chunk> chunks;  ///< full chunks only
   std::vector<RunPoint> tail;            ///< copy of all points behind the full chunks
   std::vector<LegBegun> legs;
   EnvironmentEffect environment;  ///< mean of the run so far
@@ -88,12 +88,13 @@ struct AcquisitionOptions {
   /// largest distance of the machine from the first (last) vertex during the standstill before
   /// (after) the run
   double vertex_tolerance_m = 2e-3;
-  double reading_tolerance_m = 20e-6;  ///< see VertexReadings
+  /// largest difference between readings and vertex, see VertexReadings
+  double reading_tolerance_m = 20e-6;
   /// If the machine is farther than this from every leg of the path, it drives another path, and
   /// the run fails.
   double path_tolerance_m = 10e-3;
-  /// shortest standstill before the run: the 20 points that calib's alignment of tracker and path
-  /// needs, at 100 Hz
+  /// Shortest standstill before the run. The default gives, at 100 Hz, the 20 points that calib
+  /// needs to align tracker and path.
   std::chrono::nanoseconds stand_before = std::chrono::milliseconds{200};
   /// length of the standstill before the run whose points are kept, counted back from its end
   std::chrono::nanoseconds keep_before = std::chrono::milliseconds{400};
@@ -104,19 +105,20 @@ struct AcquisitionOptions {
   /// The run fails if, during it, no tracker point arrives for longer than this, or none with axis
   /// positions. Counted in the times of the samples.
   std::chrono::nanoseconds silence = std::chrono::seconds{30};
-  /// tick() fails the run if no point arrives for longer than this host time, which is `silence`
-  /// plus the delay with which a stalled tracker may deliver its backlog.
+  /// tick() fails the run if no point arrives for longer than this host time. The value is
+  /// `silence` plus the time by which a stalled tracker may deliver its points late.
   std::chrono::nanoseconds arrival_time_out = std::chrono::seconds{40};
   /// the run fails if the machine has not stopped at the first vertex and left it within this time
   std::chrono::nanoseconds wait_for_start = std::chrono::hours{1};
   /// the run fails if the machine stands still on the path for longer than this
   std::chrono::nanoseconds longest_stop = std::chrono::minutes{15};
-  /// Largest number of points in a run: 67 min at 1000 points a second, 200 MB. Limits the memory
-  /// if the machine never stops at the end of the path, for example because it repeats the path.
+  /// Largest number of points in a run: 67 min at 1000 points a second, 200 MB. It limits the
+  /// memory in case the machine never stops at the end of the path, for example because it repeats
+  /// the path.
   std::size_t most_points = 4'000'000;
-  EnvironmentUseOptions environment;  ///< with which the snapshots were corrected
-  /// If the tracker's clock steps back by more than this, it has restarted. Packets out of order
-  /// make it step back by one burst at most (a third of a second).
+  EnvironmentUseOptions environment;  ///< options with which the snapshots were corrected
+  /// If the tracker's clock steps back by more than this, the clock has restarted. Packets out of
+  /// order make it step back by one burst at most (a third of a second).
   std::chrono::nanoseconds clock_began_anew = std::chrono::seconds{1};
 };
 
@@ -124,18 +126,18 @@ class OtfAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// `path_m`: vertices of the polyline, at least two. All work that depends on the number n of
-  /// vertices is done here, in O(n), except that of release().
+  /// `path_m`: vertices of the path, at least two. The constructor does all work that depends on
+  /// the number n of vertices, in O(n), except the work of release().
   explicit OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options = {},
                           calib::otf::Mode mode = calib::otf::Mode::OnTheFly);
 
-  /// To be called before the first take(). Snapshots before `from` are ignored.
+  /// Call it before the first take(). Snapshots before `from` are ignored.
   void begin(protocol::HostTime from) noexcept { from_ = from; }
   /// Takes one snapshot. A point whose device time is not later than that of the previous point is
   /// left out and counted.
   void take(const protocol::Snapshot& snapshot);
   /// Fails a run that receives no more points; `now` is host time. A replay need not call it:
-  /// without it the run stays incomplete, and gives no model either.
+  /// without the call the run stays incomplete and gives no model either.
   void tick(protocol::HostTime now);
 
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
@@ -145,16 +147,18 @@ class OtfAcquisition {
   [[nodiscard]] const StartCheck* start() const noexcept {
     return phase_ == Phase::WaitingAtStart ? &start_ : nullptr;
   }
-  [[nodiscard]] double progress() const noexcept;  ///< driven fraction of the path length, 0 to 1
+  /// travelled fraction of the path length, 0 to 1
+  [[nodiscard]] double progress() const noexcept;
   [[nodiscard]] std::size_t points() const noexcept { return points_.size(); }
   /// Time to the end of the path at the speed of the last half minute; nullopt if the machine does
   /// not move.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> remaining() const noexcept;
-  /// False in standstill mode: its observations are the stops, not the points in motion.
+  /// False in standstill mode, whose observations are the stops and not the points in motion.
   [[nodiscard]] bool has_live_tables() const noexcept {
     return mode_ == calib::otf::Mode::OnTheFly;
   }
-  /// Takes the same time for a long run as for a short one.
+  /// What was added to the run since the last call. The cost does not depend on the length of the
+  /// run.
   [[nodiscard]] RunNews take_news();
   /// The points of the run; O(n).
   [[nodiscard]] std::vector<RunPoint> release() { return std::exchange(points_, {}).joined(); }
@@ -189,7 +193,7 @@ class OtfAcquisition {
 
   std::vector<AxisPosition> path_m_;
   calib::otf::PathIndex path_;
-  std::vector<double> driven_at_m_;  // length along the path up to each vertex
+  std::vector<double> driven_at_m_;  // length along the path from the first to each vertex
   protocol::HostTime from_{};
   AcquisitionOptions options_;
   calib::otf::Mode mode_ = calib::otf::Mode::OnTheFly;
@@ -216,9 +220,9 @@ class OtfAcquisition {
   };
   std::array<Mark, 16> marks_{};  // ring, one every kMarkEvery
   std::size_t marked_ = 0;        // number of all marks
-  std::deque<LegBegun> legs_;     // not yet taken by take_news()
-  std::size_t begun_leg_ = 0;     // the last that was added to legs_
-  std::size_t chunks_taken_ = 0;  // by take_news()
+  std::deque<LegBegun> legs_;     // legs that take_news() has not returned yet
+  std::size_t begun_leg_ = 0;     // the last leg that was added to legs_
+  std::size_t chunks_taken_ = 0;  // number of chunks that take_news() has returned
   protocol::HostTime axes_known_at_{};
   protocol::HostTime last_time_{};
   std::optional<protocol::DeviceTime> last_device_time_;

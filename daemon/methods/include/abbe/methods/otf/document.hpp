@@ -15,7 +15,8 @@ namespace abbe::daemon {
                                          calib::otf::Mode mode, const Config& config,
                                          std::vector<InputFile> inputs, protocol::UtcTime created);
 
-/// The same with what the run left: verdict and residuals along the path (RunFigures).
+/// Same as the function above, with the figures of the run in addition: verdict and residuals along
+/// the path (RunFigures).
 [[nodiscard]] ModelDocument otf_document(const OtfCandidate& candidate, const Config& config,
                                          std::vector<InputFile> inputs, protocol::UtcTime created);
 

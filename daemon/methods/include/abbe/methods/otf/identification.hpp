@@ -49,18 +49,19 @@ struct OtfCandidate {
   std::optional<std::array<double, 2>> temperature_K{};  ///< OtfRun::temperature_K
 };
 
-/// What an identification needs of a run: live, replayed or from files.
+/// Input of an identification from a run. The run is live, replayed or from files.
 struct OtfTask {
   std::vector<calib::otf::TrackerObservation> points;
   calib::otf::Path path;
   calib::otf::Noise noise;
   calib::otf::Options options;  ///< with progress and stop
-  /// Scale readings with times of the machine's clock, for the component along the path. Readings
-  /// of another drive are not used: a note in the observations states why.
+  /// Scale readings with times of the machine's clock; they improve the component of the error
+  /// along the path. Readings from another motion than the run are not used; a note in the
+  /// observations states why.
   std::optional<calib::otf::EncoderLog> scales{};
   std::optional<std::string> unmeasured_air{};  ///< OtfRun::unmeasured_air
 };
-/// Of an acquired run, with the options of [otf].
+/// Makes the task for an acquired run, with the options of [otf].
 [[nodiscard]] OtfTask otf_task(const OtfRun& run, const Config& config,
                                const IdentificationWatch& watch);
 
@@ -70,9 +71,9 @@ struct IdentifiedRun {
   calib::Verdict verdict;
   std::vector<RunResiduals> residuals;
 };
-/// Identifies and judges. `active`: the active model, with which the gate compares; null if there
-/// is none. An Error DataInsufficient names what is missing if the run does not determine the
-/// model.
+/// Identifies a model and judges it. `active`: the active model, with which the gate compares; null
+/// if there is none. An Error DataInsufficient names what is missing if the run does not determine
+/// the model.
 [[nodiscard]] Result<IdentifiedRun> identify_otf(const OtfTask& task, const Config& config,
                                                  const calib::VolumetricModel* active);
 

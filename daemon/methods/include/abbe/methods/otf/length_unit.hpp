@@ -1,5 +1,5 @@
 #pragma once
-/// Finds lengths of a file that are not in millimetres, for `identify otf`. Pure.
+/// Detects lengths in a file that are not in millimetres, for `identify otf`. Pure.
 
 #include <filesystem>
 
@@ -11,8 +11,8 @@ namespace abbe::daemon {
 
 /// Compares the spread (rms distance from the centre) of the points with that of the path. BadInput
 /// if it differs by the factor of a usual unit (m, um, inch; within a factor of 2); the text names
-/// file and unit. Which file is wrong is seen from `travel`: the one whose spread is farther from
-/// it. Errors of machines, dwells and missing parts change a spread by much less.
+/// file and unit. The wrong file is the one whose spread differs more from `travel`. Machine
+/// errors, dwells and missing parts of a run change a spread by much less.
 /// `file`: name of the tracker's file in messages.
 [[nodiscard]] Result<void> check_length_unit(const std::filesystem::path& file,
                                              const TrackerFile& tracker, const PathFile& path,

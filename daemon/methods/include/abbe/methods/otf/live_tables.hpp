@@ -1,8 +1,9 @@
 #pragma once
-/// Tables of an on-the-fly run while the machine moves (calib/otf/live/running_estimate.hpp). The
-/// run's points are read where the acquisition keeps them, so that a better pose of the tracker can
-/// accumulate them again. Nothing here influences points, model or hash of the run. Not for the RT
-/// path and not for the hub: tables() takes up to a second. Used by one thread at a time.
+/// Tables of an on-the-fly run that are computed while the machine moves
+/// (calib/otf/live/running_estimate.hpp). The points of the run are shared with the acquisition and
+/// not copied, so that they can be accumulated again when a better pose of the tracker is known.
+/// This class changes neither points nor model nor hash of the run. Not for the RT path and not for
+/// the hub: tables() takes up to a second. Used by one thread at a time.
 
 #include <cstddef>
 #include <vector>
@@ -20,9 +21,9 @@ class OtfLiveTables {
   /// BadInput for a machine without tables.
   [[nodiscard]] static Result<OtfLiveTables> of(const Config& config);
 
-  /// What the acquisition has added since the last call. O(1) per point.
+  /// Takes the points and legs that the acquisition has added since the last call. O(1) per point.
   void take(RunNews&& news);
-  /// DataInsufficient until three vertices that span a plane are reached.
+  /// DataInsufficient until the machine has reached three vertices that span a plane.
   [[nodiscard]] Result<LiveTables> tables();
 
  private:
@@ -35,12 +36,13 @@ class OtfLiveTables {
   EnvironmentUseOptions environment_use_;
   EnvironmentEffect environment_;
   calib::MachineNodes nodes_;
-  std::vector<calib::otf::Nest> nests_;  // points in a nest are not of the path
+  std::vector<calib::otf::Nest> nests_;  // points in a nest do not belong to the path
   calib::otf::RunningEstimate estimate_;
   std::vector<RunPoints::Chunk> chunks_;
   std::vector<RunPoint> tail_;
   std::vector<LegBegun> legs_;
-  std::size_t next_point_ = 0, next_leg_ = 0;  // that the estimate does not contain
+  // first point and first leg that the estimate does not contain yet
+  std::size_t next_point_ = 0, next_leg_ = 0;
 };
 
 }  // namespace abbe::daemon

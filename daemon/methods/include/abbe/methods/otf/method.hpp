@@ -34,8 +34,9 @@ struct OtfMethod {
   [[nodiscard]] static MethodNeeds needs(const Config&) { return {.tracker = true}; }
   [[nodiscard]] static Options options(const Config& config);
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
-  /// Throws nlohmann::json::exception for a member that is missing or of the wrong type.
-  /// Without a member "mode": that of [otf] of `config`; null: nullopt.
+  /// Reads a request. If "mode" is missing, the mode of [otf] of `config` is used, or nullopt if
+  /// `config` is null. Throws nlohmann::json::exception for another member that is missing, or for
+  /// one of the wrong type.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
   /// Refused if the tracker is configured for stationary mode; the other errors are those of
   /// check_otf_path().

@@ -1,5 +1,5 @@
 #pragma once
-/// What `abbe plan otf` writes: path.csv, map.csv and the figures of plan.json. Pure.
+/// The output of `abbe plan otf`: path.csv, map.csv and the figures of plan.json. Pure.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -8,9 +8,9 @@
 
 namespace abbe::daemon {
 
-/// path.csv with the feed of each leg.
+/// The text of path.csv, with the feed of each leg.
 [[nodiscard]] std::string to_path_csv(const calib::otf::Path& path, double feed_m_per_s);
-/// map.csv: `x_mm,y_mm,z_mm,u_um`.
+/// The text of map.csv, with the columns `x_mm,y_mm,z_mm,u_um`.
 [[nodiscard]] std::string to_map_csv(const calib::otf::Prediction& prediction);
 /// The figures of a prediction, without its map.
 [[nodiscard]] nlohmann::json prediction_json(const calib::otf::Prediction& prediction);

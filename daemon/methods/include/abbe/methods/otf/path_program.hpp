@@ -18,9 +18,10 @@ namespace abbe::daemon {
 
 enum class Dialect { LinuxCnc, Siemens, Heidenhain };
 inline constexpr std::array kDialects{Dialect::LinuxCnc, Dialect::Siemens, Dialect::Heidenhain};
-[[nodiscard]] std::string_view name(Dialect dialect) noexcept;       ///< "linuxcnc"
-[[nodiscard]] std::string_view extension(Dialect dialect) noexcept;  ///< of its files: ".ngc"
-/// nullopt for another name.
+[[nodiscard]] std::string_view name(Dialect dialect) noexcept;  ///< "linuxcnc"
+/// extension of its files: ".ngc"
+[[nodiscard]] std::string_view extension(Dialect dialect) noexcept;
+/// The dialect with this name; nullopt for an unknown name.
 [[nodiscard]] std::optional<Dialect> dialect_named(std::string_view name) noexcept;
 
 /// `stand_s`: standstill before the first leg and after the last. A program for machine coordinates

@@ -1,8 +1,8 @@
 #pragma once
-/// What a run on the fly needs before the machine may drive off: a list for the operator, and
-/// whether the machine has driven off without it. Depends on the points only, and on the time of
-/// tick() for streams that have stopped. Not for the RT path; not thread-safe. Lengths in m; axis
-/// positions are scale readings in the order X, Y, Z.
+/// Checks the conditions that must hold before the machine may start an on-the-fly run. Shows them
+/// as a list for the operator, and detects that the machine has started too early. Depends on the
+/// points only, and on the time of tick() for streams that have stopped. Not for the RT path; not
+/// thread-safe. Lengths in m; axis positions are scale readings in the order X, Y, Z.
 
 #include <array>
 #include <chrono>
@@ -32,18 +32,19 @@ class StartCheck {
     bool usable = true;                 ///< valid, and slow enough
     bool settled = true;                ///< the clock of the tracker is known
     std::optional<calib::Vector3> q_m;  ///< nullopt: axis positions are missing
-    std::chrono::nanoseconds stood{};   ///< at the first vertex, with usable points
+    /// duration of the standstill at the first vertex, with usable points
+    std::chrono::nanoseconds stood{};
   };
 
-  /// A stream of less than this share of usable points, or of points with axis positions, is not
-  /// sufficient for a run.
+  /// Smallest share of usable points, and of points with axis positions, in the stream. A run is
+  /// not possible with less.
   static constexpr double kShare = 0.95;
 
   explicit StartCheck(const Options& options);
 
-  /// Each point while the run has not begun, in order of time.
+  /// Call it for each point until the run begins, in order of time.
   void take(const Point& point);
-  /// `now`: host time.
+  /// Detects streams that have stopped. `now`: host time.
   void tick(protocol::HostTime now);
 
   /// All conditions hold: the machine may drive off.
@@ -51,13 +52,15 @@ class StartCheck {
   /// The machine has left the first vertex along its first leg, and the run has not begun. True
   /// until all conditions hold again.
   [[nodiscard]] bool missed() const noexcept { return !missed_.empty(); }
-  /// What was missing when the machine last stood at the first vertex; empty: nothing.
+  /// The condition that did not hold when the machine last stood at the first vertex; empty: all
+  /// held.
   [[nodiscard]] const std::string& missing_at_start() const noexcept { return missing_at_start_; }
   /// Message for the operator: what to wait for, that the machine may drive off, or what was
   /// missing when it drove off.
   [[nodiscard]] std::string text() const;
-  /// Conditions in the order in which the operator meets them: tracker, axes, position,
-  /// standstill; a tenth of a second old at most, without points from the tracker 1.5 s.
+  /// The conditions in the order in which the operator has to satisfy them: tracker, axes,
+  /// position, standstill. They are at most a tenth of a second old, or 1.5 s if the tracker sends
+  /// no points.
   [[nodiscard]] StartState state() const { return {ready_, missed(), conditions_}; }
 
  private:
@@ -86,7 +89,8 @@ class StartCheck {
   std::vector<StartCondition> conditions_;
   protocol::HostTime judged_at_{};
   bool was_at_start_ = false;
-  std::string missing_at_start_;  // when the machine was at the first vertex
+  // condition that did not hold when the machine was at the first vertex
+  std::string missing_at_start_;
   bool ready_ = false;
   std::string missed_;
 };

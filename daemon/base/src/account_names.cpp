@@ -22,7 +22,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kLargestGroupEntry = 1u << 20;  // with all its members
+constexpr std::size_t kLargestGroupEntry = 1u << 20;  // bytes of a group entry with all its members
 constexpr std::size_t kFirstBuffer = 16384;
 
 struct CloseFile {
@@ -125,7 +125,8 @@ struct AccountNames::Shared : std::enable_shared_from_this<Shared> {
   std::map<std::string, Answer<gid_t>> groups;
   std::size_t look_ups = 0;
 
-  /// The present answer; a missing or old one is asked for first, in the local file at once.
+  /// The present answer for the key. If it is missing or old, a new answer is first requested: from
+  /// the local file at once, from the name service in the background.
   template <class Key, class Value, class FromFile, class FromService>
   std::optional<Value> find(std::map<Key, Answer<Value>>& answers, const Key& key,
                             FromFile from_file, FromService from_service) {
@@ -157,7 +158,7 @@ struct AccountNames::Shared : std::enable_shared_from_this<Shared> {
         self->answered.notify_all();
       }).detach();
     } catch (const std::system_error&) {
-      return;  // no thread: asked again with the next request
+      return;  // the thread could not be started: the next request asks again
     }
     known.asked = true;
     ++look_ups;

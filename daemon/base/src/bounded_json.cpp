@@ -22,8 +22,8 @@ std::size_t end_of_string(std::string_view text, std::size_t quote) {
   return text.size();
 }
 
-/// Checks nesting depth and number of values. Both are counted as a parser counts them, which stops
-/// at the first syntax error in `text`.
+/// Checks nesting depth and number of values. They are counted as a parser would count them; the
+/// count stops at the first syntax error in `text`.
 Result<void> check_structure(std::string_view text, std::string_view what,
                              const JsonBounds& bounds) {
   std::size_t depth = 0;

@@ -29,7 +29,8 @@ std::string duration_text(nanoseconds duration) {
 }  // namespace
 
 ClockReading read_clocks() {
-  // Before CLOCK_BOOTTIME, so that no suspended time is negative.
+  // This clock is read before CLOCK_BOOTTIME, so that the difference, the suspended time, is never
+  // negative.
   const nanoseconds running = read_clock(CLOCK_MONOTONIC);
   return {.utc = read_clock(CLOCK_REALTIME),
           .since_boot = read_clock(CLOCK_BOOTTIME),

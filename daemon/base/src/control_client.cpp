@@ -48,7 +48,7 @@ std::string group_name(gid_t gid) {
   return fmt::format("{}", gid);
 }
 
-/// Of this process.
+/// True if this process is a member of the group.
 bool in_group(gid_t gid) {
   std::array<gid_t, 1024> groups{};
   const int count = ::getgroups(static_cast<int>(groups.size()), groups.data());
@@ -56,7 +56,7 @@ bool in_group(gid_t gid) {
                                          gid) != groups.begin() + std::max(count, 0);
 }
 
-/// What to do if the socket cannot be connected.
+/// Advice for the user if the socket cannot be connected.
 std::string advice(const std::filesystem::path& socket) {
   struct stat seen {};
   if (::access(socket.c_str(), R_OK | W_OK) == 0 || errno != EACCES ||
@@ -82,7 +82,7 @@ Result<void> send_line(int fd, const std::string& line, const std::filesystem::p
   return {};
 }
 
-/// From now until `end`, at least 0.
+/// Time from now until `end`, at least 0.
 int remaining_ms(Clock::time_point end) {
   return static_cast<int>(std::max<std::int64_t>(
       0, std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count()));
@@ -125,8 +125,8 @@ std::string harmless(std::string_view text) {
   return out;
 }
 
-/// Replaces what a device may have sent to the daemon and a terminal would execute. The depth of
-/// `value` is bounded by parse_json().
+/// Replaces control characters that a device may have sent to the daemon and that a terminal would
+/// execute. The depth of `value` is bounded by parse_json().
 void replace_control_characters(json& value) {
   if (value.is_string()) value = harmless(value.get_ref<const std::string&>());
   if (value.is_structured())
@@ -142,7 +142,7 @@ Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& re
 
 Result<json> ControlConnection::ask(const json& request, std::chrono::milliseconds time_out) {
   auto answer = exchange(request, time_out);
-  if (!answer) {  // a late answer to this request would be taken for that to the next one
+  if (!answer) {  // a late answer to this request would be taken for the answer to the next one
     fd_ = FileDescriptor{};
     return answer;
   }
@@ -163,7 +163,8 @@ Result<json> ControlConnection::exchange(const json& request, std::chrono::milli
   }
 
   const auto sent = send_line(fd_.get(), line_of(request), path_);
-  // A daemon that closes the connection before the end of the request has sent the reason.
+  // If the daemon closed the connection before the end of the request, it has sent the reason
+  // first.
   const auto line = receive_line(fd_.get(), sent ? time_out : 0ms, path_);
   if (!line) return tl::unexpected(sent ? line.error() : sent.error());
 

@@ -56,7 +56,7 @@ struct Client {
   Clock::time_point active;  ///< time of the last received or sent byte
   std::string inbox = {};
   std::string outbox = {};
-  bool long_request = false;  ///< one is being answered; the next one waits
+  bool long_request = false;  ///< a long request is being answered; the next request waits
 
   [[nodiscard]] bool has_request() const { return inbox.find('\n') != std::string::npos; }
   [[nodiscard]] bool may_be_answered() const {
@@ -113,8 +113,9 @@ class Server final : public ControlServer {
   }
 
  private:
-  /// An exception (no memory) ends what caused it: one request, one connection, one cycle. Never
-  /// the socket: without it nobody could stop the machine.
+  /// Runs cycles forever. An exception (no memory) ends only its cause: one request, one
+  /// connection, or one cycle. It must never end the server, because the socket is needed to stop
+  /// the machine.
   void serve_always() noexcept {
     for (;;) {
       try {
@@ -137,7 +138,7 @@ class Server final : public ControlServer {
     }
   }
 
-  /// At most one line in kFaultPeriod. Needs no memory.
+  /// Reports a fault, at most one line in kFaultPeriod. Needs no memory.
   void report(const char* what) noexcept {
     const auto now = Clock::now();
     if (now < next_report_.load()) return;
@@ -196,7 +197,7 @@ class Server final : public ControlServer {
     (void)!::read(long_done_.get(), &count, sizeof count);
     for (LongRequests::Job& done : long_.answered()) {
       const auto c = std::ranges::find(clients_, done.client, &Client::number);
-      if (c == clients_.end()) continue;  // it has left
+      if (c == clients_.end()) continue;  // the client has disconnected
       c->outbox += done.line;
       c->long_request = false;
       c->active = Clock::now();
@@ -270,7 +271,7 @@ class Server final : public ControlServer {
     send_now(c, line);
   }
 
-  /// As cycle(); a client whose cycle fails is disconnected.
+  /// As cycle(), but a client whose cycle throws an exception is disconnected.
   bool cycle_alone(Client& c, short revents) noexcept {
     try {
       return cycle(c, revents);
@@ -281,7 +282,7 @@ class Server final : public ControlServer {
     }
   }
 
-  /// Sends all of it or nothing; needs no memory.
+  /// Sends the whole line or nothing. Allocates no memory.
   static void send_now(const Client& c, const std::string& line) noexcept {
     (void)!::send(c.fd.get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   }
@@ -332,7 +333,7 @@ class Server final : public ControlServer {
     return true;
   }
 
-  /// Without memory for the request, or for the answer.
+  /// The answer to a request. An answer that reports a lack of memory needs no memory.
   std::string answer_line(const std::string& line, const ControlPeer& peer) {
     try {
       return line_of(answer(line, peer));
@@ -371,7 +372,7 @@ class Server final : public ControlServer {
   std::list<Client> clients_;
   std::uint64_t last_number_ = 0;
   Clock::time_point accept_paused_until_{};
-  // any thread; two threads may both report
+  // atomic because both threads may report
   std::atomic<Clock::time_point> next_report_{Clock::time_point{}};
   const std::string failed_line_ = line_of(refusal(
       {ErrorCode::Io,

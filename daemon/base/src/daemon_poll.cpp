@@ -13,7 +13,8 @@
 namespace abbe::daemon {
 namespace {
 
-// Longer than the hub's longest cycle under load, shorter than two heartbeats of MTConnect.
+// This is longer than the hub's longest cycle under load, and shorter than two heartbeats of
+// MTConnect.
 constexpr std::chrono::seconds kStatusTimeOut{2};
 
 DaemonPoll::Answer ask_for_status(const std::filesystem::path& socket) {

@@ -19,7 +19,7 @@ ExitDeadline::ExitDeadline(std::chrono::nanoseconds time_limit, int exit_code, s
                act = std::move(last_act)]() mutable {
         if (met_.wait_for(time_limit)) return;
         if (act) text += act();
-        // Not stdio: the hanging thread may hold the lock of stderr.
+        // stdio is not used, because the hanging thread may hold the lock of stderr.
         write_within(STDERR_FILENO, text, kMessageTime);
         ::_exit(exit_code);
       }) {}

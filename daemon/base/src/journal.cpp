@@ -67,7 +67,7 @@ class TextJournal final : public JournalSink {
   void write(const JournalEntry& entry) override {
     std::string line = fmt::format("abbed: {} [", entry.message);
     for (const auto& [name, value] : entry.fields)
-      if (name != "ABBE_FAULT")  // the message contains it
+      if (name != "ABBE_FAULT")  // the message already contains this field
         line += fmt::format("{}={} ", name, value);
     line.back() = ']';
     line = protocol::printable_line(line) + '\n';

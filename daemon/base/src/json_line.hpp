@@ -6,7 +6,7 @@
 
 namespace abbe::daemon {
 
-/// One line of the control API.
+/// The message as one line of the control API.
 inline std::string line_of(const nlohmann::json& message) {
   return json_text(message) + '\n';
 }

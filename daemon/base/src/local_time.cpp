@@ -16,7 +16,7 @@ std::string local_time_text(protocol::UtcTime time) {
   const std::time_t seconds =
       std::chrono::floor<std::chrono::seconds>(time).time_since_epoch().count();
   std::tm local{};
-  // localtime_r() need not read TZ.
+  // The call is necessary because localtime_r() need not read TZ.
   static const bool zone_is_read = (::tzset(), true);
   if (!zone_is_read || ::localtime_r(&seconds, &local) == nullptr || local.tm_gmtoff == 0)
     return utc;

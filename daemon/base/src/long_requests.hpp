@@ -12,10 +12,10 @@
 
 namespace abbe::daemon {
 
-/// Answers long requests of the control socket on a thread of its own, one after the other: a path
-/// of 10^5 vertices takes a part of a second, for which no other client would get an answer. At
-/// most kMostWaiting wait; the request of a client that has left is not carried out any more. The
-/// functions are for one thread.
+/// Answers long requests of the control socket on a separate thread, one after the other. A path of
+/// 10^5 vertices takes a fraction of a second, in which no other client would get an answer. At
+/// most kMostWaiting requests wait. The request of a client that has disconnected is not carried
+/// out. The functions are for one thread.
 class LongRequests {
  public:
   using Answer = std::function<std::string(const std::string& line, const ControlPeer& peer)>;
@@ -25,7 +25,7 @@ class LongRequests {
     ControlPeer peer;
   };
 
-  static constexpr std::size_t kMostWaiting = 4;  ///< of up to 4 MB each
+  static constexpr std::size_t kMostWaiting = 4;  ///< requests of up to 4 MB each
 
   /// `answer` runs on the thread of the object; afterwards `done_fd`, an eventfd, is signalled. It
   /// must not throw.
@@ -36,7 +36,8 @@ class LongRequests {
 
   /// False if too many requests wait.
   [[nodiscard]] bool take(std::uint64_t client, std::string line, ControlPeer peer);
-  /// The client has left: its request is not carried out, unless it is being answered.
+  /// The client has disconnected. Its request is not carried out, unless it is being answered
+  /// already.
   void forget(std::uint64_t client);
   [[nodiscard]] std::list<Job> answered();
 
@@ -45,9 +46,10 @@ class LongRequests {
 
   Answer answer_;
   int done_fd_;
-  std::mutex mutex_;  // of the members below
+  std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
-  // Lists: a request moves from one to the other without memory, so no answer can be lost.
+  // Lists are used because a request moves from one to the other without allocation, so that no
+  // answer can be lost.
   std::list<Job> waiting_;
   std::list<Job> answered_;
   bool stopping_ = false;

@@ -26,7 +26,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A pipe that poll() reports as writable takes this many bytes without blocking [pipe(7)].
+/// poll() reports a pipe as writable only if it takes this many bytes without blocking [pipe(7)].
 constexpr std::size_t kPipeTakes = 512;
 
 std::int64_t now_ms() noexcept {
@@ -35,11 +35,11 @@ std::int64_t now_ms() noexcept {
   return std::int64_t{now.tv_sec} * 1000 + now.tv_nsec / 1'000'000;
 }
 
-/// Messages on their way to the descriptor. Never destroyed: its thread may be blocked in write()
-/// when the process ends.
+/// The thread that writes messages to the descriptor. It is never destroyed, because it may be
+/// blocked in write() when the process ends.
 class StderrThread {
  public:
-  /// The thread receives no signal: those of the program are for other threads.
+  /// The thread receives no signals; they are delivered to other threads of the program.
   explicit StderrThread(std::string program) : program_(std::move(program)) {
     sigset_t all, before;
     ::sigfillset(&all);
@@ -48,7 +48,7 @@ class StderrThread {
     ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
   }
 
-  /// A message without memory for it is dropped.
+  /// Queues a message. A message for which there is no memory is dropped.
   void take(std::string_view text) noexcept {
     {
       const std::lock_guard lock(mutex_);
@@ -85,7 +85,8 @@ class StderrThread {
     }
   }
 
-  /// Without memory for it, the number of lost messages is reported later.
+  /// Adds the number of lost messages to `text`. If there is no memory for it, the number is
+  /// reported later.
   void add_lost(std::string& text) noexcept {
     if (dropped_ == 0) return;
     try {
@@ -96,7 +97,8 @@ class StderrThread {
     }
   }
 
-  /// Waits as long as it takes. A descriptor that fails (a closed pipe) loses the text.
+  /// Writes all of `text`, however long it takes. If the descriptor fails (a closed pipe), the text
+  /// is lost.
   static void write_whole(std::string_view text) {
     while (!text.empty()) {
       const ssize_t n = ::write(STDERR_FILENO, text.data(), text.size());
@@ -126,7 +128,7 @@ ssize_t take_from_stdio(void* /*cookie*/, const char* text, std::size_t size) {
   return static_cast<ssize_t>(size);
 }
 
-/// std::cerr and std::clog.
+/// Stream buffer of cerr and clog.
 class StreamToThread final : public std::streambuf {
   std::streamsize xsputn(const char* text, std::streamsize size) override {
     stderr_thread->take({text, static_cast<std::size_t>(size)});
@@ -150,7 +152,7 @@ void unblock_stderr(std::string program) {
   if (stream == nullptr) return;
   stderr_thread = new StderrThread(std::move(program));  // NOLINT: never destroyed, see there
   ::setvbuf(stream, nullptr, _IONBF, 0);
-  ::stderr = stream;                             // glibc: a variable [stdin(3)]
+  ::stderr = stream;  // glibc: stderr is a variable that may be assigned [stdin(3)]
   static auto& to_thread = *new StreamToThread;  // NOLINT: used until the process ends
   std::cerr.rdbuf(&to_thread);
   std::clog.rdbuf(&to_thread);

@@ -12,9 +12,9 @@ namespace {
 
 using nlohmann::json;
 
-/// Parts of abbed that "streams" lists beside the devices. Without the recorder or the store a
-/// calibration is lost; without DDS the machine runs without compensation, which abbed reports as a
-/// warning, too.
+/// Parts of abbed that "streams" lists in addition to the devices. Without the recorder or the
+/// store a calibration is lost. Without DDS the machine runs without compensation; abbed reports
+/// this as a warning, too.
 struct Part {
   std::string_view stream;
   Level when_bad;
@@ -28,7 +28,7 @@ const Part* part_of(const std::string& stream) {
   return part != kParts.end() ? part : nullptr;
 }
 
-/// "connecting; last fault: tracker 10.0.0.7:700: no reply in 200 ms"
+/// The text of a state: "connecting; last fault: tracker 10.0.0.7:700: no reply in 200 ms".
 std::string text_of_state(const json& stream) {
   const auto fault = stream.at("last_fault").get<std::string>();
   return fmt::format("{}{}{}", stream.at("state").get<std::string>(),

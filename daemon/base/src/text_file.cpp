@@ -30,8 +30,8 @@ bool write_all(int fd, std::string_view text) {
   return true;
 }
 
-/// Syncs the folder to the disk: only then a file that was renamed in it has its new name after a
-/// power failure.
+/// Syncs the folder to the disk. Only after this, a file that was renamed in the folder keeps its
+/// new name in a power failure.
 bool sync_folder(const std::filesystem::path& folder) {
   const FileDescriptor fd(
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -43,7 +43,7 @@ Result<std::string> read_all(const FileDescriptor& fd, const struct stat& status
   std::string text(static_cast<std::size_t>(status.st_size), '\0');
   std::size_t have = 0;
   for (;;) {
-    // The size is unknown (pipe), or the file became longer after fstat().
+    // The file has an unknown size (pipe), or became longer after fstat().
     if (have == text.size()) text.resize(text.size() + 65536);
     const auto got = ::read(fd.get(), text.data() + have, text.size() - have);
     if (got < 0 && errno == EINTR) continue;
@@ -69,7 +69,7 @@ Result<std::string> read_regular_file(const std::filesystem::path& file) {
   constexpr off_t kMost_bytes = off_t{1} << 30;
   const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   struct stat status {};
-  // ENXIO: a socket, or a device file without a device.
+  // ENXIO means a socket, or a device file without a device.
   if (!fd && errno != ENXIO) return io_failure("read", file);
   if (!fd || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
     return fail(ErrorCode::BadInput, fmt::format("read {}: is not a regular file", file.string()));

@@ -51,7 +51,8 @@ Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
   // SO_SNDTIMEO also limits how long connect() waits for a place in the listener's backlog
   // [unix(7)].
   set_send_time_out(fd.get(), time_out);
-  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);  // as the socket API requires
+  // the socket API requires this cast
+  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);
 
   if (::connect(fd.get(), generic, sizeof *address) != 0) {
     if (errno != EAGAIN) return tl::unexpected(failed("connect", path));

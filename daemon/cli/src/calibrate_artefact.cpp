@@ -76,7 +76,7 @@ struct Touched {
   std::vector<evemu::Touch> touches;
   double u_position_m = 0.0;
   std::string reason;
-  ErrorCode code = ErrorCode::DataInsufficient;  ///< of `reason`
+  ErrorCode code = ErrorCode::DataInsufficient;  ///< error code that belongs to `reason`
 };
 
 Result<Touched> touch_artefact(const std::filesystem::path& socket,

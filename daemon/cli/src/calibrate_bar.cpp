@@ -41,7 +41,7 @@ namespace mfb = calib::mfb;
 
 struct CalibrateBarArguments {
   DaemonSocket where;
-  IdentifyBarCommand files;  ///< gauge: as given; the readings are written to another file
+  IdentifyBarCommand files;  ///< the gauge file as given; the readings are written to another file
   std::size_t gauge_runs = 3, at_most = 0;
   double clearance_mm = 4.0, travel_height_mm = 40.0;
   bool continues = false, yes = false;
@@ -71,7 +71,7 @@ bool has_readings(const mfb::StepGauge& gauge) {
   return !gauge.faces.front().readings_m.empty();
 }
 
-/// What a gauge.toml states besides name and readings.
+/// The values in a gauge.toml, except name and readings.
 std::vector<double> stated_values(const mfb::StepGauge& gauge) {
   const calib::Expansivity expansion = gauge.expansion.value_or(calib::Expansivity{});
   std::vector<double> values{gauge.u_m,
@@ -89,15 +89,15 @@ std::vector<double> stated_values(const mfb::StepGauge& gauge) {
 }
 
 bool same_gauge(const mfb::StepGauge& a, const mfb::StepGauge& b) {
-  constexpr double kRounding = 1e-11;  // of the text in a file
+  constexpr double kRounding = 1e-11;  // rounding of the text in a file
   const auto values_a = stated_values(a), values_b = stated_values(b);
   return a.name == b.name &&
          std::equal(values_a.begin(), values_a.end(), values_b.begin(), values_b.end(),
                     [](double x, double y) { return std::abs(x - y) <= kRounding; });
 }
 
-/// gauge.toml that the command writes. One of an earlier run is used by --continue if it states
-/// the same gauge as --gauge.
+/// Checks the gauge.toml that an earlier run wrote. --continue uses it if it states the same gauge
+/// as --gauge.
 Result<void> check_measured_gauge(const CalibrateBarArguments& arguments, const GaugeFile& given) {
   const fs::path file = beside_output(arguments, ".gauge.toml");
   if (has_readings(given.gauge) || !fs::exists(file)) return {};
@@ -139,7 +139,7 @@ Result<void> wait_for_operator(const std::string& instruction, bool yes) {
   return fail(ErrorCode::Refused, "ended by a signal; --continue goes on at this pass");
 }
 
-/// How well the gauge must be aligned, so that its uncertainty is true.
+/// The alignment of the gauge that its stated uncertainty requires, as text.
 std::string alignment_of(const mfb::StepGauge& gauge) {
   return gauge.u_alignment_rad
              ? fmt::format("(u {:g} mrad)", 1e3 * *gauge.u_alignment_rad)
@@ -155,7 +155,8 @@ class BarCalibration {
         points_(std::move(points)),
         socket_(std::move(socket)) {}
 
-  /// Touches what is still to be touched. False: --at-most ended the run before.
+  /// Makes the touches that are still missing. False: the option --at-most ended the run before all
+  /// were made.
   [[nodiscard]] Result<bool> touch_all() {
     const auto& measurements = what_.plan.plan.measurements;
     std::size_t done = 0;
@@ -170,7 +171,7 @@ class BarCalibration {
     return true;
   }
 
-  /// gauge.toml with readings.
+  /// The gauge.toml with the readings.
   [[nodiscard]] fs::path gauge_file() const {
     return has_readings(what_.gauge.gauge) ? fs::path(arguments_.files.gauge)
                                            : beside_output(arguments_, ".gauge.toml");
@@ -214,7 +215,7 @@ class BarCalibration {
     return points_.add(rows_of(m, touches));
   }
 
-  /// The first measurement with the direction of the bar that the touches of all passes show.
+  /// The first measurement, with the direction of the bar as the touches of all passes show it.
   [[nodiscard]] Result<mfb::Measurement> bar_as_it_lay() const {
     const auto touches = read_bar_points_csv(points_.file(), what_.bar.bar, what_.plan,
                                              nodes_of_measuring_machine());
@@ -259,7 +260,7 @@ class BarCalibration {
                                                                     made->places_m.size())));
   }
 
-  /// Writes the touches of a pass that is not used to a file of their own.
+  /// Writes the touches of a pass that is not used to a separate file.
   [[nodiscard]] Error with_kept(Error error, const std::string& rows) const {
     const fs::path file = beside_output(arguments_, ".partial.csv");
     const auto kept = replace_file(file, points_csv(rows));

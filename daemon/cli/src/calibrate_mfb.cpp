@@ -34,7 +34,8 @@ Result<MfbRequest::File> file_with_text(const std::string& file) {
   return MfbRequest::File{std::filesystem::path(file).filename().string(), std::move(*text)};
 }
 
-/// Bar and plan are checked here, too, so that the message names the files as they were given.
+/// The request from the files. Bar and plan are also checked here, so that messages contain the
+/// file names as the user gave them.
 Result<MfbRequest> request_of_files(const CalibrateMfbArguments& arguments) {
   auto bar_file = file_with_text(arguments.bar);
   ABBE_TRY(bar_file);
@@ -46,7 +47,7 @@ Result<MfbRequest> request_of_files(const CalibrateMfbArguments& arguments) {
   return MfbRequest{std::move(*bar_file), std::move(*plan_file), {}};
 }
 
-/// The touches of an interrupted session, with its bar and plan.
+/// The request from a recording: the touches of an interrupted session, with its bar and plan.
 Result<MfbRequest> request_of_recording(const CalibrateMfbArguments& arguments) {
   const auto recording = open_recording(arguments.recording);
   ABBE_TRY(recording);

@@ -1,6 +1,6 @@
-/// `abbe calibrate probe`: delay and lobing of a touch probe from the touches of a recording. The
-/// running daemon makes the recording while the operator touches one place at three feeds (for the
-/// delay), or a sphere from all sides at the measuring feed (for the lobing).
+/// `abbe calibrate probe`: determines delay and lobing of a touch probe from the touches of a
+/// recording. The running daemon makes the recording while the operator touches one place at three
+/// feeds (for the delay), or a sphere from all sides at the measuring feed (for the lobing).
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -46,7 +46,7 @@ bool usable(const ProbeTrigger& touch) {
 
 struct Touches {
   std::vector<calib::probe::RecordedTouch> usable;
-  std::string damage;  ///< of the recording; empty: none
+  std::string damage;  ///< damage of the recording; empty: none
 };
 
 Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {

@@ -6,10 +6,12 @@
 
 namespace abbe::daemon {
 
-/// `words` of a command line with the present name of each option that had another one.
+/// The `words` of a command line; options that had another name in earlier versions get their
+/// present name.
 [[nodiscard]] std::vector<std::string> present_options(std::vector<std::string> words);
 
-/// "joint", an earlier word for the estimator "simultaneous", becomes the latter.
+/// Converts the word "joint" of earlier versions to its present name, the estimator "simultaneous".
+/// Other words are returned unchanged.
 [[nodiscard]] std::string estimator_word(std::string word);
 
 }  // namespace abbe::daemon

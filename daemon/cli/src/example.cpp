@@ -46,7 +46,7 @@ constexpr std::array kPurposes{
     Purpose{"truth.csv", "the errors of a simulated machine"},
 };
 
-/// "path" of "path.csv"
+/// The name without extension: "path" of "path.csv".
 std::string_view stem_of(const EmbeddedText& file) {
   return file.name.substr(0, file.name.find('.'));
 }

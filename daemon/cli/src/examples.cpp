@@ -12,7 +12,7 @@ namespace abbe::daemon {
 namespace {
 
 struct Example {
-  std::string_view command;  ///< without "abbe "
+  std::string_view command;  ///< the command without "abbe "
   std::string_view arguments;
 };
 

@@ -19,7 +19,8 @@ namespace abbe::daemon {
           {"max_um", s.max_m * kUmPerM}};
 }
 
-/// `value` in the unit of which `per_si` are one SI unit; null if there is none.
+/// `value` divided by 1 / `per_si` (one SI unit is `per_si` units of the result); null if there is
+/// no value.
 [[nodiscard]] inline nlohmann::json figure_or_null(double per_si,
                                                    const std::optional<double>& value) {
   return value ? nlohmann::json(per_si * *value) : nlohmann::json();
@@ -35,7 +36,7 @@ struct VectorColumns {
                      "rms", width.figure, "largest", width.figure);
 }
 
-/// In um, with three decimals.
+/// The statistics as a row of the table, in um with three decimals.
 [[nodiscard]] inline std::string vector_row(std::string_view name, const calib::VectorStatistics& s,
                                             const VectorColumns& width) {
   return fmt::format("{:<{}}  {:>{}.3f}  {:>{}.3f}  {:>{}.3f}", name, width.name,

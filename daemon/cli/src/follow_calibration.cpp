@@ -40,7 +40,7 @@ int print_session_verdict(const json& session, bool as_json) {
   return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
 }
 
-/// What the run determines so far.
+/// The number and uncertainty of the tables that the run has determined so far.
 struct TablesSoFar {
   std::size_t tables = 0, determined = 0;
   /// Largest standard uncertainty of the determined tables in m and in rad; empty without such a
@@ -81,7 +81,7 @@ bool much_better(const std::optional<double>& now, const std::optional<double>& 
   return now && earlier && *now < kMuchBetter * *earlier;
 }
 
-/// "acquiring, about 3.3 min left"
+/// The state with the remaining time: "acquiring, about 3.3 min left".
 std::string with_remaining_time(const std::string& state, const json& session) {
   const std::string remaining = remaining_time(session);
   return remaining.empty() ? state : fmt::format("{}, {}", state, remaining);
@@ -125,7 +125,7 @@ class SessionLog {
  private:
   std::string printed_;
   std::size_t noted_ = 0;
-  TablesSoFar tables_;  // printed last
+  TablesSoFar tables_;  // what was printed last
 };
 
 /// The session with the number `id`, running or ended; nullopt if the daemon does not keep it any

@@ -1,6 +1,6 @@
 #pragma once
-/// The common part of every `abbe calibrate METHOD` that runs in the daemon: options, request,
-/// following to the verdict, cancelling.
+/// The common part of every `abbe calibrate METHOD` that runs in the daemon: the options, sending
+/// the request, following it to the verdict, and cancelling.
 
 #include <CLI/App.hpp>
 #include <nlohmann/json.hpp>

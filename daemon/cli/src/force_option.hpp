@@ -1,5 +1,5 @@
 #pragma once
-/// --force and --why: a person uses a model although it must not be used.
+/// The options --force and --why: a person uses a model although it must not be used.
 
 #include <CLI/App.hpp>
 #include <string>
@@ -8,7 +8,8 @@
 
 namespace abbe::daemon {
 
-/// `what` is done by force; `why`: help of --why. --reason is another name of --why.
+/// Adds the options. `what`: the action that is forced, for the help; `why`: help of --why.
+/// --reason is another name of --why.
 CLI::Option* add_force_options(CLI::App& command, ForceOption& options, const std::string& what,
                                const std::string& why);
 

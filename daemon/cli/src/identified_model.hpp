@@ -11,13 +11,13 @@
 
 namespace abbe::daemon {
 
-/// Where the options of the result go.
+/// The variables that receive the options of the result.
 struct ResultOptions {
   std::string& keep;
   bool& json;
   std::string &out, &pdf;
 };
-/// Adds --keep, --json, --out and --pdf. What `options` refers to must outlive `command`.
+/// Adds --keep, --json, --out and --pdf. The variables in `options` must outlive `command`.
 void add_result_options(CLI::App& command, const ResultOptions& options);
 
 /// Adds --pdf FILE.
@@ -26,7 +26,7 @@ void add_pdf_option(CLI::App& command, std::string& pdf);
 /// Prints the held-out residuals and the decision of the gate to stdout.
 void print_verdict(const calib::Verdict& verdict);
 
-/// 0, or the exit code of a refusal.
+/// The exit code for the verdict: 0, or the exit code of a refusal.
 [[nodiscard]] int exit_code(const calib::Verdict& verdict);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// What `abbe identify bar` does and, after its touches, `abbe calibrate bar`.
+/// The part of `abbe identify bar` that `abbe calibrate bar` also uses, after its touches.
 
 #include "abbe/tasks/identify_bar.hpp"
 

@@ -38,8 +38,8 @@ struct IdentifyEvemuCommand : IdentifyEvemuArguments {
   bool json = false;
 };
 
-/// The cross-validation error over lambda and gamma, from which they were chosen; cells that no
-/// solution path reached are left out.
+/// A CSV table of the cross-validation error over lambda and gamma, from which both were chosen.
+/// Cells that no solution path reached are left out.
 std::string to_surface_csv(const evemu::SparseChoice& choice) {
   std::string text = "gamma,lambda,error_um2\n";
   constexpr double kUm2PerMm2 = 1e6;

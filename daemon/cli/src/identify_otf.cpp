@@ -31,7 +31,8 @@ struct IdentifyOtfCommand : IdentifyOtfArguments {
   bool json = false;
 };
 
-/// Of one run: two numbers; of several: two arrays, in the order of the runs.
+/// Adds the offsets of the ranges: for one run two numbers; for several runs two arrays, in the
+/// order of the runs.
 void add_range_offsets(nlohmann::json& object, const std::vector<otf::RangeOffset>& offsets) {
   nlohmann::json values = nlohmann::json::array(), us = nlohmann::json::array();
   for (const otf::RangeOffset& offset : offsets) {
@@ -137,7 +138,7 @@ int run(const IdentifyOtfCommand& arguments) {
   return exit_code(outcome->verdict);
 }
 
-/// What files of other programs do not state.
+/// Adds the options for information that files of other programs do not contain.
 void add_foreign_options(CLI::App& command, IdentifyOtfArguments& arguments, CLI::Option* encoder) {
   command
       .add_option("--tracker-unit", arguments.tracker_unit,

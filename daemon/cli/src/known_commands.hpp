@@ -14,8 +14,8 @@ namespace abbe::daemon {
 /// The arguments after the program name. `help A B` becomes `A B --help`, `help` becomes `--help`.
 [[nodiscard]] std::vector<std::string> command_line(int argc, const char* const* argv);
 
-/// Whether the last word is `--help` or `-h`. CLI11 then prints the help of the last command it
-/// understood and ignores the words after it.
+/// True if the last word is `--help` or `-h`. CLI11 then prints the help of the last command that
+/// it recognised and ignores the words after it.
 [[nodiscard]] bool asks_for_help(const std::vector<std::string>& words);
 
 /// The error for the first word that is neither a subcommand nor an argument of one; it names the

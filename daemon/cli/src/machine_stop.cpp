@@ -18,10 +18,10 @@ using std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kStopPollPeriod{50};
 constexpr std::string_view kWhatToDo = "check the machine, use its emergency stop";
 
-/// abbed connects again, which takes 3 s at most, and waits for the answer to AbortE, 5 s at most.
+/// abbed needs at most 3 s to connect again and at most 5 s for the answer to AbortE.
 constexpr std::chrono::seconds kLongestStop{10};
-/// A request reaches the thread of the machine within some ms. Later a missing or smaller number is
-/// that of an abbed that restarted.
+/// A request reaches the machine's thread within a few ms. If the answer contains no number, or a
+/// smaller number, after this time, abbed has restarted.
 constexpr std::chrono::seconds kReceivedSoon{2};
 
 bool is_received(const json& stop, std::uint64_t number) {

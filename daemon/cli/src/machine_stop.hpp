@@ -10,8 +10,8 @@
 
 namespace abbe::daemon {
 
-/// `stop`: the member "stop" of an answer. The error of an outcome that leaves the machine moving
-/// (StopNotConfirmed, StopNotSent), else the sentence of the outcome.
+/// `stop`: the member "stop" of an answer. Returns the sentence of the outcome. If the machine may
+/// still be moving, returns an Error (StopNotConfirmed, StopNotSent).
 [[nodiscard]] Result<std::string> stop_outcome(const nlohmann::json& stop);
 
 /// Waits for the outcome of the request with this number. StopNotConfirmed if the daemon does not

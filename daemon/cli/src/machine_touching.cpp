@@ -54,8 +54,8 @@ TouchesMade made_of(const json& answer, std::size_t asked) {
   return out;
 }
 
-/// True if the daemon touches no more: it cancelled the touching, or it refused the request because
-/// no touching was running.
+/// Cancels the touching. True if the daemon touches no more: it has cancelled, or it refused the
+/// request because no touching was running.
 bool cancel(const std::filesystem::path& socket) {
   const auto answer = ask_daemon(socket, {{"do", "touch"}, {"cancel", true}});
   return answer || answer.error().code == ErrorCode::Refused;

@@ -1,7 +1,7 @@
 #pragma once
 /// Touches by the measuring machine of the running daemon: requests them and follows their
 /// progress. The machine must not move unsupervised. Therefore this program cancels the touching
-/// after a signal or when the daemon does not answer. The daemon itself cancels the touching if no
+/// after a signal, or if the daemon does not answer. The daemon itself cancels the touching if no
 /// client requests the progress for 2 s.
 
 #include <filesystem>
@@ -13,12 +13,14 @@
 
 namespace abbe::daemon {
 
-/// The touches that were made; `reason` is empty if all of them were.
+/// The touches that were made; `reason` is empty if all requested touches were made.
 struct TouchesMade {
-  std::vector<calib::Vector3> places_m;  ///< as the machine reports them, in their order
+  /// positions as the machine reports them, in the order of the touches
+  std::vector<calib::Vector3> places_m;
   double u_position_m = 0.0;
   std::string reason;
-  /// Of `reason`: DataInsufficient, or that the machine is not confirmed to be stopped.
+  /// Error code that belongs to `reason`: DataInsufficient, or that the stop of the machine is not
+  /// confirmed.
   ErrorCode code = ErrorCode::DataInsufficient;
 };
 
@@ -26,8 +28,8 @@ struct TouchesMade {
 [[nodiscard]] Result<calib::Vector3> machine_position(const std::filesystem::path& socket);
 
 /// Returns when all touches are made, or a touch was refused, or the touching was cancelled
-/// (SIGINT, SIGTERM, SIGHUP, SIGQUIT), or the daemon did not answer for 5 s. An error: the touching
-/// was not started.
+/// (SIGINT, SIGTERM, SIGHUP, SIGQUIT), or the daemon did not answer for 5 s. Returns an Error if
+/// the touching was not started.
 [[nodiscard]] Result<TouchesMade> make_touches(const std::filesystem::path& socket,
                                                const calib::MachineTouches& touches);
 

@@ -35,7 +35,7 @@ const char* unit_of(const direct::TableComparison& table) {
   return table.is_angle ? "urad" : "um";
 }
 
-// JSON.
+// Output as JSON.
 
 json reversal_json(const std::optional<direct::Reversal>& reversal) {
   if (!reversal) return {};
@@ -116,7 +116,7 @@ json measured_json(const MeasuredComparison& found, const MeasuredOptions& optio
   return object;
 }
 
-// Text.
+// Output as text.
 
 std::string coloured_verdict(const direct::TableComparison& table) {
   const std::string text = fmt::format("{:<12}", direct::name(table.finding));
@@ -153,7 +153,7 @@ void print_remarks(const direct::TableComparison& table) {
   for (const auto& cause : table.causes) remark(cause);
 }
 
-/// The conventions, each once.
+/// Prints the conventions, each one once.
 void print_conventions(const MeasuredComparison& found) {
   std::vector<std::pair<std::string, std::vector<std::string>>> tables_of;
   for (const auto& table : found.tables) {
@@ -222,7 +222,7 @@ void print_measured_text(const MeasuredComparison& found) {
   print_volume(found.volume);
 }
 
-/// What an .rtl file does not state.
+/// Adds the options for information that an .rtl file does not contain.
 void add_rtl_options(CLI::App& command, MeasuredOptions& options, CLI::Option* measured) {
   command
       .add_option("--measured-error", options.error,

@@ -19,7 +19,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// The last request of the recording for a calibration with a bar.
+/// The last request in the recording for a calibration with a bar.
 Result<CalibrationRequest> last_bar_request(const OpenedRecording& recording) {
   std::optional<CalibrationRequest> last;
   for (const RecordingAttachment& attachment : recording.reader.attachments()) {

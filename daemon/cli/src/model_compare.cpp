@@ -1,5 +1,5 @@
-/// `abbe model compare A B`: the difference of two models, in the volume where both are valid; or
-/// of a model and directly measured error motions.
+/// `abbe model compare A B`: prints the difference of two models in the volume where both are
+/// valid, or the difference between a model and directly measured error motions.
 
 #include <fmt/format.h>
 
@@ -47,7 +47,7 @@ void print_models(const ModelsComparison& found) {
              vector_row("without a rigid motion", found.difference.rigid_free, kDifference));
 }
 
-/// The exit code.
+/// Compares and prints. Returns the exit code.
 Result<int> compare(const CompareCommand& arguments) {
   if (!arguments.measured.file.empty()) {
     const auto model = found_model(arguments.a, arguments.store);

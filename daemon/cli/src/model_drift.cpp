@@ -1,4 +1,4 @@
-/// `abbe model drift A B`: has the machine changed from model A to model B?
+/// `abbe model drift A B`: tests whether the machine has changed from model A to model B.
 
 #include <fmt/format.h>
 #include <unistd.h>

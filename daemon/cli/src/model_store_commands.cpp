@@ -54,7 +54,7 @@ nlohmann::json to_json(const StoreEntry& entry) {
 }
 
 void print_table(const std::vector<StoreEntry>& entries) {
-  std::size_t width = 0;  // of the time: local and UTC, or UTC alone
+  std::size_t width = 0;  // width of the time column: local time and UTC, or UTC alone
   for (const auto& entry : entries) width = std::max(width, local_time_text(entry.added).size());
   fmt::print("{:<16}  {:<{}}  {:<6}  {:<20}  {}\n", "id", "added", width, "method", "machine",
              "state");
@@ -158,8 +158,9 @@ int show(const ModelStoreArguments& arguments) {
   return 0;
 }
 
-/// The hash of the present configuration, for which the user accepts model `id`. Refused if nothing
-/// is to be accepted, or if more differs than an earlier version did not know.
+/// The hash of the present configuration, for which the user accepts model `id`. Refused if there
+/// is nothing to accept, or if the configurations differ in keys that the version of the model
+/// already knew.
 Result<std::string> accepted_configuration(const ModelStoreArguments& arguments,
                                            const ModelStore& store, const std::string& id) {
   const auto config = load_config(arguments.store.config);
@@ -208,7 +209,8 @@ int activate(const ModelStoreArguments& arguments) {
   return 0;
 }
 
-/// Refused for a model of another machine than that of the configuration; without -c unknown.
+/// Refused if the model belongs to another machine than that of the configuration. Without -c the
+/// machine is not known, and the check is skipped.
 Result<void> check_machine(const ModelStoreArguments& arguments, const ModelDocument& document) {
   if (arguments.store.config.empty()) return {};
   const auto config = load_config(arguments.store.config);
@@ -229,7 +231,8 @@ Result<ModelDocument> judged_model(const std::string& file) {
   return document;
 }
 
-/// Adds a model.json with the verdict of the gate that it has, also if that is a refusal.
+/// Adds a model.json to the store. The model keeps the verdict of the gate in the file, also if it
+/// is a refusal.
 int add(const ModelStoreArguments& arguments) {
   const auto document = judged_model(arguments.id);
   if (!document) return report(document.error());

@@ -1,5 +1,5 @@
-/// `abbe plan mfb`: positions and measurements of a calibration with a Multi-Feature Bar, or the
-/// judgement of a plan that exists.
+/// `abbe plan mfb`: plans the positions and measurements of a calibration with a Multi-Feature Bar,
+/// or judges an existing plan.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -63,7 +63,7 @@ void print_bar_plan(const BarPlan& plan, const mfb::Bar& bar) {
   for (const auto& note : plan.notes) fmt::print("note        {}\n", note);
 }
 
-/// The least distance of neighbours.
+/// The smallest distance of two neighbours.
 double least_step_m(const std::vector<double>& places_m) {
   double least_m = places_m.back() - places_m.front();
   for (std::size_t i = 1; i < places_m.size(); ++i)
@@ -71,10 +71,10 @@ double least_step_m(const std::vector<double>& places_m) {
   return least_m;
 }
 
-/// What a plan lacks to show the errors of one axis at all of its nodes.
+/// Reasons why the plan does not determine the errors of one axis at all of its nodes.
 std::vector<std::string> reasons_of_axis(const BarPlan& plan, const PlanInputs& inputs,
                                          calib::Axis axis) {
-  constexpr double kCloser = 0.9;  // of the distance of the holes
+  constexpr double kCloser = 0.9;  // fraction of the distance of the holes
   const auto& nodes_m = inputs.machine.nodes[index(axis)].nodes_m;
   const double pitch_m = least_step_m(inputs.bar.pattern.hole_x_m);
   const double step_m = least_step_m(nodes_m);
@@ -96,7 +96,7 @@ std::vector<std::string> reasons_of_axis(const BarPlan& plan, const PlanInputs& 
   return reasons;
 }
 
-/// Why a plan that leaves errors open is no plan.
+/// The Error for a plan that does not determine all errors.
 Error not_seen(const BarPlan& plan, const PlanInputs& inputs) {
   const mfb::SolveOptions limits;
   Error error{ErrorCode::DataInsufficient,

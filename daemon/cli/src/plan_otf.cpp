@@ -1,4 +1,5 @@
-/// `abbe plan otf`: computes a path for an on-the-fly calibration, or predicts one that exists.
+/// `abbe plan otf`: computes a path for an on-the-fly calibration, or predicts the uncertainty of
+/// an existing path.
 
 #include <fmt/format.h>
 

@@ -64,7 +64,7 @@ class ReferenceLog {
   }
 
  private:
-  std::map<std::string, std::string> printed_;  // last line by axis
+  std::map<std::string, std::string> printed_;  // the last printed line of each axis
 };
 
 int print_result(const json& reference, bool as_json) {

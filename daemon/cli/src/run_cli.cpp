@@ -99,7 +99,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_example(app, exit);
 }
 
-/// The command that the words name, as far as they name one: "abbe calibrate otf".
+/// The command that the words name, as far as they match a command: "abbe calibrate otf".
 std::pair<const CLI::App*, std::string> named_command(const CLI::App& app) {
   const CLI::App* command = &app;
   std::string name = "abbe";
@@ -110,7 +110,7 @@ std::pair<const CLI::App*, std::string> named_command(const CLI::App& app) {
   return {command, name};
 }
 
-/// A command line that cannot be used, with the help of the command that was typed.
+/// The Error for an invalid command line; it contains the help of the command that was typed.
 Error usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const auto [command, name] = named_command(app);
   const std::string help = fmt::format("see `{} --help`", name);

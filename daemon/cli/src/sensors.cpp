@@ -1,4 +1,4 @@
-/// `abbe sensors accept`: states that a sensor whose readings the daemon refuses is right.
+/// `abbe sensors accept`: states that a sensor is correct although the daemon refuses its readings.
 
 #include <fmt/format.h>
 

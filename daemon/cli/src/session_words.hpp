@@ -14,9 +14,9 @@ namespace abbe::daemon {
 /// The state for people: "before the start" for "warming", "has ended: accepted".
 [[nodiscard]] std::string state_in_words(const nlohmann::json& session);
 
-/// What is to be said of the session, one sentence each: the verdict with reasons and notes, or why
-/// it is in this state, or what to do now; the command that identifies the run again. Older
-/// versions of abbed send no verdict.
+/// Sentences about the session: the verdict with reasons and notes, or the reason of its state, or
+/// what the operator must do; and the command that identifies the run again. Older versions of
+/// abbed send no verdict.
 [[nodiscard]] std::vector<std::string> sentences_of(const nlohmann::json& session);
 
 }  // namespace abbe::daemon

@@ -95,7 +95,8 @@ void print_positions(const json& status) {
                  coloured(missing, kYellow, STDOUT_FILENO));
 }
 
-/// Earlier versions of abbed send none; nothing is printed then.
+/// Prints the identity of the machine. Earlier versions of abbed send none; nothing is printed
+/// then.
 void print_identity(const json& identity) {
   if (identity.empty()) return;
   const auto id = identity.value("machine_id", std::string{});
@@ -117,7 +118,7 @@ void print_next(const json& next) {
              next["touched"].get<std::size_t>(), next["points"].get<std::size_t>());
 }
 
-/// What holds of the conditions under which the machine may drive off, and what does not.
+/// Prints for each condition of the start whether it holds.
 void print_start(const json& start) {
   for (const json& condition : start["conditions"]) {
     const bool met = condition["met"];
@@ -127,7 +128,8 @@ void print_start(const json& start) {
   }
 }
 
-/// "EXX  12.3 um at 150 mm (u 0.4)"; "EXX  not yet determined (4 of 13 nodes)".
+/// The text of a table: "EXX  12.3 um at 150 mm (u 0.4)" or "EXX  not yet determined (4 of 13
+/// nodes)".
 std::string live_table_text(const json& table) {
   const json &value = table["value"], &u = table["u"];
   const std::string name = table["table"];
@@ -194,8 +196,8 @@ void print_dds(const json& dds) {
   fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
 }
 
-/// Empty if neither the devices nor the active model are simulated. Older versions of abbed do not
-/// send it.
+/// Text that names the simulated parts; empty if neither the devices nor the active model are
+/// simulated. Older versions of abbed do not send this.
 std::string simulated_parts(const json& status) {
   const bool devices = status.value("simulated", false);
   const bool model = status["model"].value("simulated", false);
@@ -204,7 +206,7 @@ std::string simulated_parts(const json& status) {
   return model ? "the model was made on SIMULATED devices" : "";
 }
 
-/// The file, and how far it is behind the machine.
+/// Prints the name of the recording file and the delay of the recording.
 void print_recording(const json& status) {
   fmt::print("recording  {}", status["recording"].get<std::string>());
   for (const json& stream : status["streams"])

@@ -8,7 +8,7 @@
 
 namespace abbe::daemon {
 
-/// What a command takes as a model, for its help.
+/// Text for the help of commands: how a model can be named.
 inline constexpr const char* kModelText =
     "model.json; or a model of the store: its id, the beginning of its id, or \"active\"";
 

@@ -66,8 +66,9 @@ class ClockModel {
   [[nodiscard]] HostInstant to_host(protocol::DeviceTime t) const ABBE_RT;
 
   [[nodiscard]] bool has_observations() const ABBE_RT { return count_ > 0; }
-  /// True if a point of the instant `t` that arrived at `arrival` would have been measured after it
-  /// arrived, by more than ClockModelOptions::jump. False before the first observation.
+  /// True if the model maps `t` to an instant later than `arrival` by more than
+  /// ClockModelOptions::jump, that is, the point would have been measured after it arrived. False
+  /// before the first observation.
   [[nodiscard]] bool is_ahead(protocol::DeviceTime t, protocol::HostTime arrival) const ABBE_RT;
 
   /// Discards all observations and counts a restart. Call when the device clock has jumped.

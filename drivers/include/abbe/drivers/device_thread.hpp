@@ -1,9 +1,9 @@
 #pragma once
 /// The real-time loop of all drivers. It calls wait() (not real-time) and receive() (real time)
 /// alternately until stop(). Before the first cycle the thread locks memory, touches its stack, and
-/// sets scheduling and affinity. An exception thrown by wait() ends the loop. Then the device stops
-/// what it moves, at once. The loop starts again after a pause, which doubles with each further
-/// exception; while a motion may go on, there is no pause.
+/// sets scheduling and affinity. An exception thrown by wait() ends the loop; the device then stops
+/// its motion at once (stop_after_failure()). The loop starts again after a pause, which doubles
+/// with each further exception. While a motion may still continue, there is no pause.
 
 #include <chrono>
 #include <cstdint>
@@ -59,10 +59,11 @@ class DeviceThread {
   /// Text of the exception that ended the loop, until the loop runs again. Meanwhile the device's
   /// own status is out of date. nullopt while the loop runs or after stop(). Takes no lock.
   [[nodiscard]] std::optional<std::string> failure() const;
-  /// The status of the device. While its loop is ended by an exception: not connected, state
-  /// "internal error", and the cause. Each failure of the loop counts as a fault.
+  /// The status of the device. After an exception has ended the loop and until it runs again, the
+  /// status is: not connected, state "internal error", and the cause. Each failure of the loop
+  /// counts as a fault.
   [[nodiscard]] DeviceStatus status() const;
-  /// How often an exception ended the loop.
+  /// Number of exceptions that ended the loop.
   [[nodiscard]] std::uint64_t failures() const noexcept;
 
  private:

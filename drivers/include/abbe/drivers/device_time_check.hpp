@@ -1,8 +1,8 @@
 #pragma once
-/// Judges the device time of each point of a stream before it reaches the clock model. One corrupt
+/// Checks the device time of each point of a stream before the clock model uses it. One corrupt
 /// time far ahead would make all later points appear too early; one far behind would restart the
-/// clock model. So a time that does not fit is refused, and only if several times in a row agree
-/// with each other has the device's clock jumped. Deterministic, fixed memory. One thread.
+/// clock model. A time that does not fit is therefore refused. If several such times in a row agree
+/// with each other, the device's clock has jumped. Deterministic, fixed memory. One thread.
 
 #include <chrono>
 
@@ -14,17 +14,18 @@ namespace abbe::drivers {
 class DeviceTimeCheck {
  public:
   enum class Verdict {
-    Follows,  ///< later than the point before
-    Refused,  ///< not later, or ahead; this point only
-    Jumped,   ///< as the points before it that were refused: the clock has a new time base
+    Follows,  ///< the time is later than that of the point before
+    Refused,  ///< the time is not later, or ahead of the arrival; only this point is refused
+    /// the time agrees with those of the points refused before it: the clock has a new time base
+    Jumped,
   };
 
-  /// Times in a row that agree before they are a new time base.
+  /// Number of refused times in a row that must agree with each other to become the new time base.
   static constexpr int kAgreeing = 3;
-  /// Largest step between two times that agree.
+  /// Largest difference of two successive times that agree.
   static constexpr std::chrono::seconds kLargestStep{10};
 
-  /// `ahead`: by the clock model the point would have been measured after it arrived.
+  /// `ahead`: according to the clock model the point would have been measured after it arrived.
   Verdict judge(protocol::DeviceTime t, bool ahead) ABBE_RT {
     if (!known_ || (t > last_ && !ahead)) {
       known_ = true;
@@ -47,9 +48,9 @@ class DeviceTimeCheck {
 
  private:
   bool known_ = false;
-  int agreeing_ = 0;  ///< points in a row that agree with each other and not with the time base
-  protocol::DeviceTime last_{};       ///< of the last point that was not refused
-  protocol::DeviceTime candidate_{};  ///< of the last point that was refused
+  int agreeing_ = 0;  ///< refused points in a row whose times agree with each other
+  protocol::DeviceTime last_{};  ///< time of the last point that was not refused
+  protocol::DeviceTime candidate_{};  ///< time of the last point that was refused
 };
 
 }  // namespace abbe::drivers

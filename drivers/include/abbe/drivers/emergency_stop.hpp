@@ -1,8 +1,8 @@
 #pragma once
-/// The last means to stop a machine that moves, for a process that ends without running its device
-/// threads: after a crash signal, in std::terminate(), or when an orderly end takes too long. Each
-/// connection to such a machine registers its socket, the bytes that stop the machine and the bytes
-/// that confirm it. send_emergency_stops() sends them from any thread and from a signal handler.
+/// Stops moving machines when the process ends without its device threads: after a crash signal, in
+/// terminate(), or when an orderly end takes too long. Each connection to such a machine registers
+/// its socket, the bytes that stop the machine and the bytes that confirm it.
+/// send_emergency_stops() sends the stop bytes from any thread and from a signal handler.
 
 #include <array>
 #include <atomic>
@@ -26,7 +26,7 @@ class EmergencyStop {
   /// The socket of the connection, a descriptor; -1: there is none. Call it with -1 before the
   /// socket is closed: it then returns when no thread uses the descriptor any more.
   void set_socket(int fd) noexcept;
-  /// Whether a motion was sent whose end is not known. Set it before the motion is sent.
+  /// `moving`: a motion was sent, and its end is not known. Call it before the motion is sent.
   void set_moving(bool moving) noexcept { moving_.store(moving, std::memory_order_release); }
 
  private:
@@ -40,10 +40,10 @@ class EmergencyStop {
 
 inline constexpr std::size_t kMostEmergencyStops = 8;
 
-/// Numbers of machines that moved, by what was done about it.
+/// Numbers of moving machines, by the result of the stop.
 struct EmergencyStops {
   int sent = 0;       ///< the command was handed to the kernel
-  int confirmed = 0;  ///< of those, how many confirmed it in time
+  int confirmed = 0;  ///< machines of `sent` that confirmed the command in time
   int not_sent = 0;   ///< not connected, or the socket did not take the command
 };
 

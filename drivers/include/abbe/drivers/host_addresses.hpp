@@ -20,20 +20,21 @@ struct HostAddress {
   sockaddr_storage at{};
   socklen_t length = 0;
 };
-/// "10.0.0.7", "fe80::1%eth0"
+/// The address as text: "10.0.0.7", "fe80::1%eth0".
 [[nodiscard]] std::string text_of(const HostAddress& address);
 
 using HostLookUp =
     std::function<Result<std::vector<HostAddress>>(const std::string& host, std::uint16_t port)>;
-/// getaddrinfo(3) for TCP; blocks. Error Unreachable: the name has no address.
+/// Calls getaddrinfo(3) for TCP; blocks. Error Unreachable: the name has no address.
 [[nodiscard]] Result<std::vector<HostAddress>> look_up_host(const std::string& host,
                                                             std::uint16_t port);
 
 struct HostAddressesOptions {
-  std::chrono::milliseconds patience{1000};  ///< for the first answer
+  std::chrono::milliseconds patience{1000};  ///< longest time to wait for the first answer
   /// Two look-ups of a name begin at least this long after each other.
   std::chrono::milliseconds refresh{2000};
-  HostLookUp look_up = &look_up_host;  ///< its thread may outlive the HostAddresses
+  /// function of the look-up; its thread may outlive the HostAddresses
+  HostLookUp look_up = &look_up_host;
 };
 
 class HostAddresses {
@@ -45,7 +46,7 @@ class HostAddresses {
   HostAddresses(const HostAddresses&) = delete;
   HostAddresses& operator=(const HostAddresses&) = delete;
 
-  /// Does not wait. The known addresses in turn, one each call; begins a look-up in the background.
+  /// The known addresses in turn, one per call. Does not wait; begins a look-up in the background.
   /// Error Unreachable: no look-up has given an address yet.
   [[nodiscard]] Result<HostAddress> next();
 

@@ -27,8 +27,8 @@ class RawRing {
   bool push_bytes(protocol::HostTime time, protocol::RawBlock::Direction direction,
                   std::span<const std::byte> bytes) ABBE_RT;
 
-  /// Reader thread. Copies the oldest blocks to `out`, of each block only its `length` bytes.
-  /// Returns the number of blocks.
+  /// Reader thread. Copies the oldest blocks to `out`; of each block only the first `length` bytes
+  /// are copied. Returns the number of blocks.
   std::size_t pop(std::span<protocol::RawBlock> out) ABBE_RT;
 
   [[nodiscard]] std::size_t capacity() const noexcept { return indices_.capacity(); }

@@ -1,5 +1,5 @@
 #pragma once
-/// What drivers of serial lines have in common. Not real-time.
+/// Common functions of drivers for serial lines. Not real-time.
 
 #include <string>
 #include <utility>

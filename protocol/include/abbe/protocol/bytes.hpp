@@ -1,8 +1,8 @@
 #pragma once
 /// Bounds-checked reader and writer of bytes, used by all wire formats of this module. Past the end
-/// a reader returns zeros and a writer writes nothing, and ok() stays false. So a decoder may read
-/// all its fields and check ok() once. No alignment needed. Not thread-safe; allocation-free,
-/// usable on the real-time path.
+/// a reader returns zeros, a writer writes nothing, and ok() becomes and stays false. A decoder may
+/// therefore read all its fields and check ok() once. No alignment is needed. Not thread-safe;
+/// allocation-free, usable on the real-time path.
 
 #include <algorithm>
 #include <array>

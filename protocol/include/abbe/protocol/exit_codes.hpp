@@ -26,7 +26,7 @@ enum class ExitCode : int {
   return static_cast<int>(code);
 }
 
-/// An exit code of one program. An empty `meaning` stands for the meaning that all programs share.
+/// An exit code of one program. An empty `meaning` means: use the meaning that all programs share.
 struct ExitCodeLine {
   ExitCode code = ExitCode::Done;
   std::string_view meaning = {};
@@ -35,7 +35,8 @@ struct ExitCodeLine {
 /// The meaning that all programs share, for example "invalid input file".
 [[nodiscard]] std::string_view meaning_of(ExitCode code) noexcept;
 
-/// "Exit codes: 0 done; 2 usage; ...", in lines of at most 96 characters, without a last newline.
+/// The text "Exit codes: 0 done; 2 usage; ...", in lines of at most 96 characters, without a last
+/// newline.
 [[nodiscard]] std::string exit_codes_text(std::initializer_list<ExitCodeLine> lines);
 
 }  // namespace abbe::protocol

@@ -11,9 +11,9 @@
 namespace abbe::protocol {
 
 /// Adds the checks to all options of `app` and of its subcommands: a value must not be empty, and a
-/// number must be decimal. The type of an option says whether it is a number. A message about a
-/// wrong command line escapes what is not printable. Call it after the last option was added,
-/// before parse(). `App`: CLI::App; a template, so that this module does not
+/// number must be decimal. The type of an option determines whether it is a number. Messages about
+/// a wrong command line escape characters that are not printable. Call it after the last option was
+/// added, before parse(). `App`: CLI::App; a template, so that this module does not
 /// depend on CLI11.
 template <class App>
 void check_option_values(App& app) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Options whose names end in a unit, given without it.
+/// Accepts options whose names end in a unit also without the unit.
 
 #include <algorithm>
 #include <array>
@@ -9,9 +9,9 @@
 
 namespace abbe::protocol {
 
-/// `name` with the unit that makes it an option of `command`: --step becomes --step-mm. `name` if
-/// it is an option itself, or if not exactly one option begins with it: --u is not --u-um where
-/// there is a --u-urad, too.
+/// The full name of the option `name` of `command`: "--step" gives "--step-mm". The result is
+/// `name` itself if it is an option, or if not exactly one option begins with it: "--u" does not
+/// give "--u-um" if "--u-urad" also exists.
 template <class App>
 std::string option_with_unit(const App& command, const std::string& name) {
   std::vector<std::string> longer;
@@ -28,9 +28,9 @@ std::string option_with_unit(const App& command, const std::string& name) {
   return std::find(units.begin(), units.end(), unit) != units.end() ? longer.front() : name;
 }
 
-/// `words` of a command line, without the name of the program, with the units of all options; what
-/// comes after "--" stays as it is. In reverse order, as App::parse() takes them. `App`: CLI::App;
-/// a template, so that this module does not depend on CLI11.
+/// The `words` of a command line, without the name of the program, with full names of all options.
+/// Words after "--" are not changed. The result is in reverse order, as App::parse() expects it.
+/// `App`: CLI::App; a template, so that this module does not depend on CLI11.
 template <class App>
 std::vector<std::string> option_words(const App& app, std::vector<std::string> words) {
   const App* command = &app;

@@ -4,7 +4,7 @@
 ///   offset  type     is
 ///   0       uint32   magic, the bytes "ABBP"
 ///   4       uint16   version, 1
-///   6       uint16   1: the axes are homed; 0: the positions mean nothing
+///   6 uint16 1: the axes are homed; 0: the positions have no meaning
 ///   8       uint32   number of the servo cycle; consecutive records have consecutive numbers
 ///   12      uint32   servo period, ns, 10 us to 100 ms
 ///   16      float64  scale readings of X, Y, Z, m
@@ -30,7 +30,8 @@ struct PositionRecord {
 };
 
 [[nodiscard]] std::array<std::byte, kPositionRecordBytes> encode(const PositionRecord& record);
-/// nullopt: another size, magic or version, another period, or a position that is not finite.
+/// Decodes a datagram. nullopt: wrong size, magic or version, an invalid period, or a position that
+/// is not finite.
 [[nodiscard]] std::optional<PositionRecord> decode_position_record(
     std::span<const std::byte> datagram);
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Text of unknown origin (cells, file names, configuration, devices, network) in a form that a
-/// person can read and that a terminal cannot take for a command. Pure; thread-safe.
+/// Makes text of unknown origin (cells, file names, configuration, devices, network) readable, and
+/// safe for a terminal, which could execute control sequences in it. Pure; thread-safe.
 
 #include <string>
 #include <string_view>
@@ -16,12 +16,12 @@ namespace abbe::protocol {
 /// As printable(), but a newline is written as "\u{A}": for one line of a log.
 [[nodiscard]] std::string printable_line(std::string_view text);
 
-/// `text` with every control character but a newline as an escape. Other characters remain, visible
-/// or not: for text that is also used as data, such as the name of a file.
+/// `text` with every control character except a newline as an escape. Other characters remain, also
+/// invisible ones. For text that is also used as data, such as the name of a file.
 [[nodiscard]] std::string without_control_characters(std::string_view text);
 
-/// The first character of `text` that is not printable ASCII, and what to do about it:
-/// "U+2212 (minus sign): write \"-\"". Empty if there is none.
+/// The first character of `text` that is not printable ASCII, with the remedy: "U+2212 (minus
+/// sign): write \"-\"". Empty if there is none.
 [[nodiscard]] std::string strange_character(std::string_view text);
 
 }  // namespace abbe::protocol

@@ -1,10 +1,11 @@
 #pragma once
 /// Decides which participant a subscriber uses when several DDS participants publish data under the
 /// same machine name. Two things are pinned:
-/// - the identity of the machine (machine_id of the topic Identity): the one that was given, else
-///   the first one, for the life of this object. Another machine of the same name is never used;
-/// - the participant: the first one of this identity, until it stops sending. While two publishers
-///   have the same identity (a copied disk), none of them is chosen.
+/// - the identity of the machine (machine_id of the topic Identity): the machine_id that was given,
+///   else the first one received. It does not change during the life of this object. Another
+///   machine of the same name is never used;
+/// - the participant: the first one with this identity, until it stops sending. While two
+///   publishers have the same identity (a copied disk), no new participant is chosen.
 /// An abbe-dds of an earlier version has no topic Identity: it is used by its name alone if no
 /// machine_id was given and no publisher states one.
 /// The header uses the standard library only, so that subscribers can copy it; publisher_pin.h has
@@ -45,14 +46,16 @@ using ParticipantId = std::array<std::uint8_t, 12>;
   return text;
 }
 
-/// The other publisher that a machine has seen, from the members twin and twin_seen of Identity.
+/// The kind of another publisher that a machine has detected, from the members twin and twin_seen
+/// of Identity.
 enum class Twin {
   None,
   Other,   ///< another machine of this name, or this machine_id under another name
   SameId,  ///< another publisher of this name and machine_id
 };
 
-/// How twin_seen begins if the other one has the same machine_id; its name and a comma follow.
+/// Beginning of twin_seen if the other publisher has the same machine_id; its name and a comma
+/// follow.
 inline constexpr std::string_view kTwinOfSameId = "the same machine_id, as machine ";
 
 /// `machine`: the name in this Identity.
@@ -81,11 +84,12 @@ class PublisherPin {
   /// sample. The successor of a restarted publisher is never foreign, because the old process has
   /// ended before the new one sends.
   static constexpr std::chrono::milliseconds kOverlap{100};
-  /// Identity comes every second. A participant that has sent for kNoIdentity without one has none.
-  /// One that has stated its identity within kPresent is there.
+  /// Identity is sent every second. A participant that has sent other topics for kNoIdentity
+  /// without an Identity is regarded as having none. A participant whose Identity came within
+  /// kPresent is regarded as present.
   static constexpr std::chrono::milliseconds kNoIdentity{5000}, kPresent{1500};
-  /// At most this many participants beside the pinned one are remembered. For a further one, that
-  /// with the oldest last sample is forgotten.
+  /// Most participants that are stored in addition to the pinned one. For a further participant,
+  /// the one with the oldest last sample is removed.
   static constexpr std::size_t kMostOthers = 7;
 
   enum class Verdict {
@@ -109,7 +113,8 @@ class PublisherPin {
     Unidentified,
   };
 
-  /// `machine_id`: of the machine that this subscriber is for. Empty: the first one is pinned.
+  /// `machine_id`: identity of the machine that this subscriber belongs to. Empty: the first
+  /// received identity is pinned.
   explicit PublisherPin(std::string machine_id = {}, std::chrono::milliseconds silence = kSilence)
       : silence_(silence) {
     if (!machine_id.empty()) machine_id_ = std::move(machine_id);
@@ -151,7 +156,8 @@ class PublisherPin {
     return machine_id_;
   }
 
-  /// What `id` states: its machine_id; nullopt: nothing yet, as an abbe-dds of before this topic.
+  /// The machine_id that participant `id` states; nullopt: none so far, as from an abbe-dds of a
+  /// version before the topic Identity.
   [[nodiscard]] std::optional<std::string> stated_by(const ParticipantId& id) const {
     if (pinned_ == id) return machine_id_;
     const auto found = std::ranges::find(others_, id, &Other::id);
@@ -159,7 +165,7 @@ class PublisherPin {
     return found->states->machine_id;
   }
 
-  /// Whether `id` is the pinned participant or a remembered one; if not, its samples need not be
+  /// True if `id` is the pinned participant or a stored one; if false, its samples need not be
   /// kept.
   [[nodiscard]] bool remembers(const ParticipantId& id) const {
     return pinned_ == id || std::ranges::find(others_, id, &Other::id) != others_.end();
@@ -173,12 +179,14 @@ class PublisherPin {
   struct Other {
     ParticipantId id;
     Instant first, last;
-    std::chrono::nanoseconds alone{};  ///< since the last sample of the pinned participant
+    /// time for which this participant alone has sent, since the last sample of the pinned one
+    std::chrono::nanoseconds alone{};
     bool foreign = false;
     std::optional<Statement> states;
   };
 
-  /// Why `other` must not be pinned now, whether or not the pinned one is silent.
+  /// The reason why `other` must not be pinned now, whether or not the pinned participant is
+  /// silent.
   [[nodiscard]] std::optional<Verdict> objection_to(const Other& other, Instant now) const {
     if (!other.states) {
       if (machine_id_ || now - other.first < kNoIdentity) return Verdict::Waiting;
@@ -196,16 +204,16 @@ class PublisherPin {
     return std::nullopt;
   }
 
-  /// Whether a foreign participant that is there states this identity: it is then the copy that the
-  /// restarted publisher sees.
+  /// True if a foreign participant that is present states this identity. It is then the copy that
+  /// the restarted publisher sees.
   [[nodiscard]] bool is_of_foreign(const std::string& machine_id, Instant now) const {
     return std::ranges::any_of(others_, [&](const Other& o) {
       return o.foreign && o.states && o.states->machine_id == machine_id && now - o.last < kPresent;
     });
   }
 
-  /// Whether another participant that is not pinned, nor foreign to the pinned one, has the same
-  /// identity.
+  /// True if another participant has the same identity, and is neither pinned nor foreign to the
+  /// pinned one.
   [[nodiscard]] bool has_copy(const Other& of, Instant now) const {
     const auto id = [](const Other& o) {
       return o.states ? std::optional{o.states->machine_id} : std::nullopt;

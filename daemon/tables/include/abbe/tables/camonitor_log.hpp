@@ -21,15 +21,16 @@ struct CamonitorOptions {
 /// True if the first line is one of camonitor: a name, then a date with a time or "***".
 [[nodiscard]] bool is_camonitor_log(std::string_view text);
 
-/// Names of the PVs in the text, in the order of their first lines; at most `most`.
+/// Names of the PVs in the text, in the order of their first occurrence; at most `most`.
 [[nodiscard]] std::vector<std::string> pvs_of_log(std::string_view text, std::size_t most);
 
 /// The scale readings of the three axes. The axes have updates at different times: there is a row
-/// at every update of an axis at which the other two are known. An axis is known at its updates,
-/// and between two that are at most 1.5 median intervals of its updates apart (linear); between two
-/// that are further apart it stood at the first one until 1.5 median intervals before the second.
+/// at every update of an axis at which the other two are known. The position of an axis is known at
+/// its updates. Between two updates at most 1.5 median intervals apart it is interpolated linearly.
+/// Between two updates further apart the axis has the position of the first one until 1.5 median
+/// intervals before the second.
 ///
-/// A fault: lines of another format (relative or client times, another separator), an axis that
+/// Faults are lines of another format (relative or client times, another separator), an axis that
 /// was disconnected, has no value, an INVALID one, or two at one time, times that go back, values
 /// with so few digits that a step is above 1 um.
 [[nodiscard]] Result<EncoderFile> parse_camonitor_log(std::string_view text,

@@ -35,7 +35,7 @@ struct BallErrorsFile {
   std::vector<std::size_t> lines;  ///< line in the file, one per error
 };
 [[nodiscard]] Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file);
-/// The same for the content of a file; `file` is its name in messages.
+/// Same as read_errors_csv() for the content of a file; `file` is its name in messages.
 [[nodiscard]] Result<BallErrorsFile> parse_errors_csv(std::string_view text,
                                                       const std::filesystem::path& file);
 
@@ -58,16 +58,17 @@ struct CalibratorFile {
   std::array<std::optional<BlockFace>, 2> faces;  ///< of blocks 1 and 2
 };
 [[nodiscard]] Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file);
-/// The same for the content of a file; `file` is its name in messages.
+/// Same as read_calibrator_toml() for the content of a file; `file` is its name in messages.
 [[nodiscard]] Result<CalibratorFile> parse_calibrator_toml(std::string_view text,
                                                            const std::filesystem::path& file);
-/// The text of a calibrator.toml. It begins with `comment`, each line of which begins with #.
+/// The text of a calibrator.toml. It begins with `comment`; each line of `comment` must begin with
+/// #.
 [[nodiscard]] std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
                                           const std::array<std::optional<BlockFace>, 2>& faces,
                                           std::string_view comment);
 
-/// The kinematic chain and the target offset of a configuration as input of calib. The target is
-/// the probe tip here.
+/// The kinematic chain and the target offset of a configuration as input of calib. For a ball array
+/// the target is the probe tip.
 [[nodiscard]] Result<calib::evemu::Machine> evemu_machine(const MachineConfig& machine);
 
 }  // namespace abbe::daemon

@@ -1,7 +1,7 @@
 #pragma once
-/// The files of a calibration of a Multi-Feature Bar that are not those of an identification with
-/// it: the step gauge, and the calibrated bar as text. Faults as in input_files.hpp. The functions
-/// may be called from any thread.
+/// The files of the calibration of a Multi-Feature Bar that an identification with the bar does not
+/// read: the step gauge, and the calibrated bar as text. Faults as in input_files.hpp. The
+/// functions may be called from any thread.
 
 #include <filesystem>
 #include <string>
@@ -24,15 +24,16 @@ struct GaugeFile {
   calib::mfb::StepGauge gauge;
 };
 [[nodiscard]] Result<GaugeFile> read_gauge_toml(const std::filesystem::path& file);
-/// The same of a gauge that is perhaps not yet measured: all [[step]] have readings_mm, or none.
+/// Reads the same file for a gauge that may not be measured yet: either all [[step]] have
+/// readings_mm, or none.
 [[nodiscard]] Result<GaugeFile> read_gauge_to_measure(const std::filesystem::path& file);
 
-/// The text of a gauge.toml with the readings of `gauge`. It begins with `comment`, each line of
-/// which begins with #.
+/// The text of a gauge.toml with the readings of `gauge`. It begins with `comment`; each line of
+/// `comment` must begin with #.
 [[nodiscard]] std::string gauge_toml(const calib::mfb::StepGauge& gauge, std::string_view comment);
 
-/// The text of a bar.toml with the covariance of all points. It begins with `comment`, each line of
-/// which begins with #.
+/// The text of a bar.toml with the covariance of all points. It begins with `comment`; each line of
+/// `comment` must begin with #.
 [[nodiscard]] std::string bar_toml(const calib::mfb::Bar& bar, std::string_view comment);
 
 }  // namespace abbe::daemon

@@ -29,20 +29,20 @@ namespace abbe::daemon {
 struct PathFile {
   InputFile source;
   std::vector<AxisPosition> vertices_m;
-  /// The feed at each vertex, NaN for an empty cell; empty if the file has no column
+  /// The feed at each vertex; NaN for an empty cell. Empty vector if the file has no column
   /// feed_mm_per_min.
   std::vector<double> feed_m_per_s;
   std::vector<std::size_t> lines;  ///< line in the file, one per vertex
 };
 [[nodiscard]] Result<PathFile> read_path_csv(const std::filesystem::path& file);
-/// The same for the content of a file; `file` is its name in messages.
+/// Same as read_path_csv() for the content of a file; `file` is its name in messages.
 [[nodiscard]] Result<PathFile> parse_path_csv(std::string_view text,
                                               const std::filesystem::path& file);
 
-/// Times of a file are relative to that of its first row: the time of day since 1970 would leave
-/// steps of 0.24 us in sums. The subtraction is exact.
+/// The times in a file are relative to the time of its first row. Absolute times since 1970 would
+/// lose accuracy in sums (steps of 0.24 us). The subtraction is exact.
 struct TimesOfFile {
-  double first_time_s = 0.0;  ///< as in the file
+  double first_time_s = 0.0;  ///< time of the first row as in the file
   std::size_t first_line = 0, last_line = 0;
 };
 
@@ -56,17 +56,21 @@ struct TrackerFile {
   TimesOfFile times{};
   enum class Frame {
     Spherical,
-    Tracker,   ///< tracker_x_mm, tracker_y_mm, tracker_z_mm
-    Unstated,  ///< x_mm, y_mm, z_mm
-    Parallel,  ///< the tracker is at the origin, its axes are those of another frame
+    Tracker,  ///< columns tracker_x_mm, tracker_y_mm, tracker_z_mm
+    Unstated,  ///< columns x_mm, y_mm, z_mm
+    /// after place_tracker(): the tracker is at the origin, the axes are those of the frame of the
+    /// file
+    Parallel,
   };
   Frame frame = Frame::Spherical;
-  calib::Vector3 centre_m = calib::Vector3::Zero();  ///< of the tracker, in the frame of the file
+  /// position of the tracker in the frame of the file
+  calib::Vector3 centre_m = calib::Vector3::Zero();
 };
 /// Moves the points of a file with x_mm, y_mm, z_mm so that the tracker, which is at `centre_m` of
 /// their frame, is at their origin: noise and offset of the ranges act along the beams. `option`:
-/// how `centre_m` is stated, for messages. BadInput if it is missing, if a file in the frame of the
-/// tracker has one, or if a point would be nearer to the tracker than 0.2 m.
+/// the option that states `centre_m`, for messages. BadInput if `centre_m` is missing, if it is
+/// given for a file in the frame of the tracker, or if a point would be nearer to the tracker than
+/// 0.2 m.
 [[nodiscard]] Result<void> place_tracker(TrackerFile& points,
                                          const std::optional<calib::Vector3>& centre_m,
                                          const std::filesystem::path& file,
@@ -98,14 +102,16 @@ struct PointsFile {
 [[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
 
 /// verification.csv: `x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm`: scale reading, and
-/// the independent measurement of the same point in the frame of the tracker; at least one. A row
-/// that repeats an earlier row in every digit is not another measurement: it counts once.
+/// the independent measurement of the same point in the frame of the tracker; at least one row. A
+/// row that repeats an earlier row in every digit is not another measurement: it counts once.
 struct VerificationFile {
   InputFile source;
   std::vector<calib::verify::MeasuredPoint> points{};
-  std::vector<std::size_t> lines{};     ///< line of each point; empty if not read from a file
+  /// line of each point in the file; empty if the points do not come from a file
+  std::vector<std::size_t> lines{};
   std::size_t repeated = 0;             ///< rows left out because they repeat another row
-  std::optional<InputFile> readings{};  ///< of points that another program exported
+  /// file with the readings of points that another program exported
+  std::optional<InputFile> readings{};
 };
 [[nodiscard]] Result<VerificationFile> read_verification_csv(const std::filesystem::path& file);
 [[nodiscard]] std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points);

@@ -1,12 +1,12 @@
 #pragma once
-/// The unit of lengths in a file of another program, as an option or the file states it.
+/// The unit of lengths in a file of another program; an option or the file states it.
 
 #include <optional>
 #include <string_view>
 
 namespace abbe::daemon {
 
-/// Metres per "um", "mm", "m" or "inch"; nullopt for another word.
+/// Metres per "um", "mm", "m" or "inch"; nullopt for an unknown unit.
 [[nodiscard]] constexpr std::optional<double> metres_per(std::string_view unit) {
   if (unit == "um") return 1e-6;
   if (unit == "mm") return 1e-3;

@@ -12,7 +12,7 @@
 
 namespace abbe::daemon {
 
-/// The errors in the order in which the file names them first. A row is a fault if
+/// The errors, in the order of their first row in the file. A row is a fault if
 /// - its unit is not that of the error: um for translations, urad for rotations and squareness,
 /// - an error motion has no position or no direction (squareness needs neither),
 /// - it repeats the run, direction and position of an earlier row of the same error,
@@ -21,7 +21,7 @@ namespace abbe::daemon {
 struct MeasuredFile {
   InputFile source;
   std::vector<calib::direct::MeasuredError> errors;
-  std::vector<std::vector<std::size_t>> lines;  ///< of the readings of each error in the file
+  std::vector<std::vector<std::size_t>> lines;  ///< lines in the file of the readings of each error
 };
 [[nodiscard]] Result<MeasuredFile> read_measured_csv(const std::filesystem::path& file);
 

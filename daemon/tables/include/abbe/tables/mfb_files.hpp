@@ -25,11 +25,11 @@ struct BarFile {
   calib::mfb::Bar bar;
 };
 [[nodiscard]] Result<BarFile> read_bar_toml(const std::filesystem::path& file);
-/// The same from the text of the file; `file`: its name in messages.
+/// Same as read_bar_toml() for the text of a file; `file` is its name in messages.
 [[nodiscard]] Result<BarFile> parse_bar_toml(std::string_view text,
                                              const std::filesystem::path& file);
 
-/// plan.toml: [plan], [noise], [[measurement]]. `bar`: with its thermal expansion every measurement
+/// plan.toml: [plan], [noise], [[measurement]]. If `bar` has a thermal expansion, every measurement
 /// needs temperature_C.
 struct BarPlanFile {
   InputFile source;
@@ -48,9 +48,11 @@ struct BarPlanFile {
 struct BarPointsFile {
   InputFile source;
   std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
-  std::vector<std::vector<std::size_t>> lines;  ///< of each touch in the file, as in `passes`
-  /// A line with file, line and column for each measurement whose rows run against its `pass`. A
-  /// bar that lies turned may look like that, so that it is no fault of the file yet.
+  /// line of each touch in the file, in the order of `passes`
+  std::vector<std::vector<std::size_t>> lines;
+  /// One text with file, line and column for each measurement whose rows run against the direction
+  /// of its `pass`. This is not yet a fault of the file, because a bar that is clamped turned looks
+  /// the same.
   std::vector<std::string> against_pass;
 };
 [[nodiscard]] Result<BarPointsFile> read_bar_points_csv(const std::filesystem::path& file,
@@ -59,7 +61,7 @@ struct BarPointsFile {
                                                         const calib::MachineNodes& nodes);
 
 /// Adds to the checks of load_config() what an identification with a bar needs: at least four nodes
-/// on every axis for cubic tables. `file`: that of `machine`.
+/// on every axis for cubic tables. `file`: file of `machine`, for messages.
 [[nodiscard]] Result<void> check_bar_machine(const std::filesystem::path& file,
                                              const MachineConfig& machine);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Checks that the positions of a file are within the travel of [axes].
+/// Checks that the positions in a file are within the travel of [axes].
 
 #include <filesystem>
 #include <span>

@@ -1,6 +1,6 @@
 #pragma once
-/// The touches that `abbe calibrate bar` makes, pass by pass, as barpoints.csv of `abbe identify
-/// bar`.
+/// The touches that `abbe calibrate bar` makes, pass by pass, in the format of barpoints.csv of
+/// `abbe identify bar`.
 
 #include <cstddef>
 #include <filesystem>
@@ -16,14 +16,15 @@ namespace abbe::daemon {
 
 /// Lines of the file for the touches of one measurement.
 [[nodiscard]] std::string rows_of(const calib::mfb::Measurement&, const calib::mfb::PassTouches&);
-/// A file with these lines.
+/// The text of a file with these lines.
 [[nodiscard]] std::string points_csv(std::string_view rows);
 
-/// A file of whole passes.
+/// A file that contains only whole passes.
 class BarPassesFile {
  public:
-  /// An existing file is used if `continues`, else refused (Usage). BadInput: a pass in it has more
-  /// or fewer touches than the pattern of the bar; their values are checked when all are there.
+  /// An existing file is used if `continues` is true, else it is refused (Usage). BadInput: a pass
+  /// in the file has more or fewer touches than the pattern of the bar. The values are checked when
+  /// all passes are complete.
   [[nodiscard]] static Result<BarPassesFile> open(std::filesystem::path file,
                                                   const calib::mfb::Bar& bar, bool continues);
 
@@ -40,7 +41,8 @@ class BarPassesFile {
 
   std::filesystem::path file_;
   std::string text_;
-  std::map<std::string, std::size_t, std::less<>> rows_;  ///< by measurement, when it was opened
+  /// number of rows per measurement when the file was opened
+  std::map<std::string, std::size_t, std::less<>> rows_;
 };
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// A model against directly measured error motions, table by table and in the volume.
+/// Compares a model with directly measured error motions, table by table and in the volume.
 
 #include <string>
 #include <vector>
@@ -12,10 +12,10 @@
 namespace abbe::daemon {
 
 struct MeasuredOptions {
-  std::string file;  ///< measured.csv or .rtl; empty: not wanted
+  std::string file;  ///< measured.csv or .rtl; empty: no comparison with a file
   std::string straightness = "end-points";
-  double u_um = 0.0, u_urad = 0.0, u_ppm = 0.0;  ///< of the device, k = 1
-  std::string error{}, line{}, unit{};           ///< what an .rtl file does not state
+  double u_um = 0.0, u_urad = 0.0, u_ppm = 0.0;  ///< standard uncertainties of the device, k = 1
+  std::string error{}, line{}, unit{};  ///< information that an .rtl file does not contain
 };
 
 struct MeasuredComparison {
@@ -23,10 +23,10 @@ struct MeasuredComparison {
   std::vector<calib::direct::TableComparison> tables;
   calib::Result<calib::direct::VolumeComparison> volume;
   calib::Vector3 tool_m;
-  std::vector<std::string> rows_off;  ///< values that alone do not fit, one line each
+  std::vector<std::string> rows_off;  ///< single values that do not fit the others, one line each
 };
 
-/// BadInput with file and line; the details name values that alone do not fit.
+/// BadInput with file and line. Error::details lists single values that do not fit the others.
 [[nodiscard]] Result<MeasuredComparison> compare_measured(const calib::VolumetricModel& model,
                                                           const MeasuredOptions& options);
 

@@ -21,10 +21,11 @@ struct ModelsComparison {
   ComparedModel a, b;
   std::size_t points = 0;
   calib::ModelDifference difference;
-  std::string different_machines;  ///< empty: they are the same
+  /// text that the models are of different machines; empty: they are of the same machine
+  std::string different_machines;
 };
 
-/// Usage: no second model; models of different machines that `other_machine` does not allow.
+/// Usage: no second model, or models of different machines although `other_machine` is false.
 /// DataInsufficient: the models have no common volume.
 [[nodiscard]] Result<ModelsComparison> compare_models(const CompareModelsArguments&);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Option --direction "+,-,0": the direction in which X, Y and Z last moved.
+/// Reads the option --direction "+,-,0": the direction in which X, Y and Z last moved.
 
 #include <string>
 
@@ -8,11 +8,12 @@
 
 namespace abbe::daemon {
 
-/// Error Usage unless `text` is three of "+", "-", "0", separated by commas; empty: all unknown.
+/// Error Usage unless `text` consists of three of "+", "-", "0", separated by commas. An empty text
+/// means that all directions are unknown.
 [[nodiscard]] Result<calib::AxisTravel> parse_direction(const std::string& text);
 
-/// DataInsufficient for a model that has no backlash: what it is in one direction is not known.
-/// `name` of the model is for the message.
+/// DataInsufficient if the model has no backlash, because its errors in one direction of travel are
+/// then not known. `name`: name of the model, for the message.
 [[nodiscard]] Result<void> require_travel(const calib::VolumetricModel&, const std::string& name);
 
 }  // namespace abbe::daemon

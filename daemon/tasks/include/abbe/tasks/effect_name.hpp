@@ -4,7 +4,7 @@
 
 namespace abbe::daemon {
 
-/// "better", "not seen", "worse".
+/// The word for an effect: "better", "not seen", "worse".
 [[nodiscard]] constexpr const char* effect_name(calib::verify::Effect effect) {
   switch (effect) {
     case calib::verify::Effect::Better:

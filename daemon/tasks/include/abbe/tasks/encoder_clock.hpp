@@ -14,13 +14,13 @@ namespace abbe::daemon {
 /// `u_time_us`: standard uncertainty of the time of one reading.
 [[nodiscard]] calib::otf::EncoderLog encoder_log(std::span<const EncoderRow>, double u_time_us);
 
-/// The relation of the clocks as the files have them, from that of times since their first rows.
+/// Converts the relation of the clocks from times since the first rows to the times in the files.
 [[nodiscard]] calib::otf::ClockMap clock_of_files(const calib::otf::ClockMap&,
                                                   const TimesOfFile& tracker,
                                                   const TimesOfFile& encoder);
 
-/// Offset and drift of the clocks with standard uncertainties, and what the readings contributed:
-/// lines of the summary.
+/// Lines of the summary: offset and drift of the clocks with standard uncertainties, and the
+/// contribution of the readings.
 [[nodiscard]] std::string clock_text(const calib::otf::Synchronisation&, double u_time_us);
 [[nodiscard]] nlohmann::json clock_json(const calib::otf::Synchronisation&, double u_time_us);
 

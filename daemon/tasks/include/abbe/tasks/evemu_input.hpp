@@ -18,10 +18,10 @@
 
 namespace abbe::daemon {
 
-/// The options that name the data. A file that is not given is an empty name.
+/// The options that name the data. An empty name means that the file is not given.
 struct EvemuInputArguments {
   std::string machine, touches, calibrator, errors, recording, rotation_reference;
-  std::optional<int> order, positions;             ///< without a value: that of [evemu]
+  std::optional<int> order, positions;  ///< without a value: as in [evemu]
   std::optional<double> artefact_C, u_artefact_K;  ///< both or none
   std::optional<double> u_reference_um{};          ///< required with rotation_reference
   bool rotation_known = false, scales_corrected = false;
@@ -37,12 +37,12 @@ struct EvemuInput {
   /// refuses the model if the recording is damaged
   std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};
   std::string recording_gap{};
-  ObservedTimes observed{};   ///< of the recording; nullopt for files
-  protocol::UtcOffset utc{};  ///< of the host clock of the recording
+  ObservedTimes observed{};  ///< times of the recording; nullopt for files
+  protocol::UtcOffset utc{};  ///< offset of the host clock of the recording
 };
 
-/// From the recording if one is named, else from the files. Io,
-/// BadInput with file and line, or DataInsufficient if the recording has no complete run.
+/// Reads the data from the recording if one is named, else from the files. Errors: Io; BadInput
+/// with file and line; DataInsufficient if the recording has no complete run.
 [[nodiscard]] Result<EvemuInput> read_evemu_input(const EvemuInputArguments&, const Progress&);
 
 /// Adds the points of the file `rotation_reference` to the input. Does nothing if none is named.

@@ -1,5 +1,5 @@
 #pragma once
-/// Writes a model as compensation file of a control, and proves it.
+/// Writes a model as compensation file of a control, and verifies the file.
 
 #include "abbe/base/error.hpp"
 #include "abbe/tasks/export_options.hpp"
@@ -7,10 +7,10 @@
 
 namespace abbe::daemon {
 
-/// The file is written to `arguments.out` only after it was read back as the control reads it, and
-/// compared with what its format can hold. Refused: the model must not be used, and the arguments
-/// do not force it. Usage: an option that the format does not have. DataInsufficient: the machine
-/// would not become better.
+/// The text of the file is first read back as the control reads it, and compared with the
+/// correction that its format can hold. Only then the file is written to `arguments.out`. Refused:
+/// the model must not be used, and the arguments do not force the use. Usage: the format does not
+/// have one of the options. DataInsufficient: the correction would not improve the machine.
 /// `show_cautions` is called with a model that may be used with caution.
 [[nodiscard]] Result<ExportReport> export_model(const ExportArguments& arguments,
                                                 const ShowCautions& show_cautions);

@@ -1,5 +1,5 @@
 #pragma once
-/// Options of `abbe export`, checked.
+/// Reads and checks the options of `abbe export`.
 
 #include <optional>
 #include <string>
@@ -19,20 +19,22 @@ struct ExportArguments {
   std::optional<double> step_mm;
 };
 
-/// The format of --to; Usage with all names if there is none.
+/// The format named by the option --to. Usage if there is no such format; the text lists all
+/// formats.
 [[nodiscard]] Result<const FormatFacts*> format_of(const std::string& to);
 
-/// --volume-mm "xmin,xmax,ymin,ymax,zmin,zmax" in mm; nullopt if empty.
+/// The volume of the option --volume-mm "xmin,xmax,ymin,ymax,zmin,zmax"; nullopt if the text is
+/// empty.
 [[nodiscard]] Result<std::optional<calib::ExportBox>> volume_of(const std::string& text);
 
-/// --axis-map "X=AX1,Y=AX2,Z=AX3": the control's names of X, Y and Z. Axes that are not given keep
-/// the names of the format. Usage for a format without names, and for names that a control cannot
-/// have or that occur twice.
+/// The control's names of X, Y and Z, from the option --axis-map "X=AX1,Y=AX2,Z=AX3". Axes that are
+/// not given keep the names of the format. Usage for a format without names, and for names that a
+/// control cannot have or that occur twice.
 [[nodiscard]] Result<std::array<std::string, 3>> axis_names_of(const std::string& text,
                                                                const FormatFacts&);
 
-/// --positive "plus" or "minus": +1 or -1. Usage if the format needs it and it is not given, or if
-/// it is given and the format has a fixed sign.
+/// The sign of the option --positive: +1 for "plus", -1 for "minus". Usage if the format needs the
+/// option and it is not given, or if it is given although the format has a fixed sign.
 [[nodiscard]] Result<int> positive_moves_of(const std::string& text, const FormatFacts&);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,6 @@
 #pragma once
-/// The report of an export: what the file holds, what it loses, its sign.
+/// The report of an export: the part of the correction that the file contains, the part that it
+/// does not contain, and the sign.
 
 #include <string>
 #include <vector>
@@ -17,15 +18,17 @@ struct ExportReport {
   ExportProof proof;
   calib::ExportLoss loss;
   std::vector<calib::ErrorLoss> by_error;
-  std::vector<std::string> not_held;  ///< sentences
+  /// properties of the model that the format cannot hold, in sentences
+  std::vector<std::string> not_held;
 };
 
-/// What no comparison of positions shows: uncertainty, validity, tool, backlash.
+/// Properties of the model that a comparison of positions does not show: uncertainty, validity,
+/// tool, backlash.
 [[nodiscard]] std::vector<std::string> not_held_by(const FormatFacts&,
                                                    const calib::VolumetricModel&,
                                                    bool direction_given);
 
 [[nodiscard]] std::string report_text(const ExportReport&);
-[[nodiscard]] std::string report_json(const ExportReport&);  ///< one object, with a line end
+[[nodiscard]] std::string report_json(const ExportReport&);  ///< one JSON object, with a line end
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// A person uses a model although it must not be used: who, when and why.
+/// Records that a person uses a model although it must not be used: who, when and why.
 
 #include <optional>
 #include <string>
@@ -14,12 +14,12 @@ struct ForceOption {
   std::string why;
 };
 
-/// This user with the reason, now; nullopt without --force. Usage for --force without --why.
+/// The user of this process, the present time and the reason; nullopt without --force. Usage for
+/// --force without --why.
 [[nodiscard]] Result<std::optional<StoreActor>> forced_by(const ForceOption& options);
-/// The name of the user who runs this program, recorded by the daemon and the store with what the
-/// program changes.
+/// The name of the user who runs this program. The daemon and the store record it with each change.
 [[nodiscard]] std::string user_name();
-/// This user and the time now.
+/// The user of this process and the present time, with the reason `why`.
 [[nodiscard]] StoreActor actor_now(std::string why);
 
 }  // namespace abbe::daemon

@@ -1,6 +1,6 @@
 #pragma once
-/// What every identification has in common: the active model with which the gate compares, and
-/// where the result goes.
+/// The common part of all identifications: the active model with which the gate compares, and the
+/// places to which the result is written.
 
 #include <map>
 #include <nlohmann/json_fwd.hpp>
@@ -21,7 +21,7 @@ struct ActiveDocument {
   std::string accepted_configuration;  ///< StoreEvent::accepted_configuration of its activation
 };
 
-/// That of the store in which the result will be kept; nullopt if `store` is empty.
+/// The active model of the store in which the result will be kept; nullopt if `store` is empty.
 [[nodiscard]] Result<std::optional<ActiveDocument>> active_model(const std::string& store);
 
 /// The model with which the gate compares a candidate.
@@ -34,26 +34,27 @@ struct ComparisonModel {
 };
 
 /// The active model, if it was made, or accepted, for the machine of `config`. A model of another
-/// machine configuration is never applied to this machine; so the gate must not compare a new model
-/// with it.
+/// machine configuration is never applied to this machine. Therefore the gate must not compare a
+/// new model with it.
 [[nodiscard]] ComparisonModel comparison_model(const std::optional<ActiveDocument>& active,
                                                const Config& config);
 
-/// Where a result goes, as the options of the command state.
+/// The places to which the result is written, as the options of the command state them.
 struct ResultPlace {
   std::string out;      ///< folder, created if needed
   std::string keep;     ///< store, or empty
   std::string command;  ///< recorded in the store as reason, "abbe identify otf"
-  std::string pdf{};    ///< the report also as this file; or empty
+  std::string pdf{};  ///< file for the report as PDF; or empty
 };
-/// File name to text.
+/// File contents by file name.
 using ResultFiles = std::map<std::string, std::string>;
 
 /// Writes model.json with the verdict, `more` and report.html, adds the model to the store with the
 /// user, and writes report.html again. Nothing is stored if a file cannot be written or the report
 /// cannot be made. The PDF comes last: its converter may be missing or fail (Io).
-/// With a store it is the report that `abbe report` makes of the stored model; else it has the
-/// verdict, and states that the model is not active. Error Io, or that of the store.
+/// With a store, report.html is the report that `abbe report` makes of the stored model. Without a
+/// store it contains the verdict and states that the model is not active. Error Io, or that of the
+/// store.
 [[nodiscard]] Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,
                                           const calib::Verdict& verdict, const ResultFiles& more,
                                           const Progress& progress = {});

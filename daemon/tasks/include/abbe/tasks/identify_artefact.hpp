@@ -1,5 +1,5 @@
 #pragma once
-/// The calibrator file of a ball array, from touches in one position on an accurate machine.
+/// Makes the calibrator file of a ball array, from touches in one position on an accurate machine.
 
 #include <cstddef>
 #include <optional>
@@ -11,14 +11,14 @@
 
 namespace abbe::daemon {
 
-/// File names and values as a person gives them; lengths in the unit of the name.
+/// Arguments as given by the user: file names, and values in the unit of their name.
 struct IdentifyArtefactArguments {
   std::string touches, name;
   std::string out;  ///< calibrator.toml
   /// Approximate outward normals of the faces of the blocks, "x,y,z".
   std::string outward_1 = "0,0,1", outward_2 = "0,1,0";
-  double tip_radius_mm = 0.0;  ///< of these touches
-  /// On the machine to be calibrated; negative: that of these touches.
+  double tip_radius_mm = 0.0;  ///< tip radius of these touches
+  /// Tip radius on the machine to be calibrated; negative: the same as `tip_radius_mm`.
   double machine_tip_radius_mm = -1.0;
   std::optional<double> u_touch_um;  ///< without a value: estimated from the touches
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// A Multi-Feature Bar, calibrated by reversal on a measuring machine.
+/// Calibrates a Multi-Feature Bar by reversal on a measuring machine.
 
 #include <cstddef>
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace abbe::daemon {
 
-/// File names; `out`: bar.toml.
+/// File names; `out` is the bar.toml to write.
 struct IdentifyBarArguments {
   std::string bar, plan, points, gauge, out;
 };
@@ -20,10 +20,11 @@ struct IdentifyBarArguments {
 struct IdentifiedBar {
   calib::mfb::BarCalibration calibration;
   std::vector<InputFile> sources;
-  std::size_t repeats = 0;  ///< normal passes, and as many reversed ones
+  std::size_t repeats = 0;  ///< number of normal passes; the number of reversed passes is the same
 };
 
-/// A measuring machine has no file: its readings may be anywhere.
+/// Nodes for a measuring machine. There is no file that describes the machine, so its readings may
+/// have any value.
 [[nodiscard]] calib::MachineNodes nodes_of_measuring_machine();
 
 /// Reads the files and writes `arguments.out`. Errors name file and line.

@@ -1,6 +1,6 @@
 #pragma once
-/// A model from a ball array: of touches, of errors that another program computed, or of a
-/// recording.
+/// Identifies a model with a ball array: from touches, from errors that another program computed,
+/// or from a recording.
 
 #include <optional>
 #include <string>
@@ -17,7 +17,7 @@ namespace abbe::daemon {
 struct IdentifyEvemuArguments {
   EvemuInputArguments input;
   std::string keep;  ///< store with whose active model the gate compares; or empty
-  std::optional<std::string> estimator, folds;  ///< without a value: that of [evemu]
+  std::optional<std::string> estimator, folds;  ///< without a value: as in [evemu]
   bool accept_shape_only = false;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// One model from several runs, ball arrays and bars that agree.
+/// Identifies one model from several runs, ball arrays and bars that agree with each other.
 
 #include <optional>
 #include <string>
@@ -14,7 +14,7 @@
 
 namespace abbe::daemon {
 
-/// A joint model and what it was made of.
+/// A joint model, and its input.
 struct JointOutcome {
   JointInput input;
   std::vector<calib::joint::PairTest> pairs;
@@ -25,13 +25,14 @@ struct JointOutcome {
   ModelDocument document;
 };
 
-/// Parts that contradict each other: there is no joint model.
+/// The result if parts contradict each other: there is no joint model.
 struct JointContradiction {
   JointInput input;
   calib::joint::JointIdentification identified;  ///< with the tests and the contradictions
 };
 
-/// Of read_joint_input(). The alternative is not an error: its tests are a result.
+/// Errors are those of read_joint_input(). A JointContradiction is not an error, because its tests
+/// are a result.
 [[nodiscard]] Result<std::variant<JointOutcome, JointContradiction>> identify_joint(
     const IdentifyJointArguments&, const Progress&);
 

@@ -1,5 +1,6 @@
 #pragma once
-/// The 21 errors of three linear axes from a Multi-Feature Bar: from files, or from a recording.
+/// Identifies the 21 errors of three linear axes with a Multi-Feature Bar: from files, or from a
+/// recording.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,11 +14,11 @@
 
 namespace abbe::daemon {
 
-/// File names and values as a person gives them.
+/// Arguments as given by the user: file names and values.
 struct IdentifyMfbArguments {
   std::string machine, bar, plan, points, recording, keep;
   std::string estimator{calib::mfb::name(calib::mfb::Estimator::Simultaneous)};
-  std::size_t trials = 0;  ///< 0: no Monte Carlo
+  std::size_t trials = 0;  ///< number of Monte Carlo trials; 0: none
   std::uint64_t seed = calib::mfb::MonteCarloOptions{}.seed;
   bool scales_corrected = false;
 };
@@ -26,7 +27,7 @@ struct MfbOutcome {
   MfbCandidate candidate;
   ModelDocument document;
 };
-/// Errors of touches name file, line and feature.
+/// Errors about touches name file, line and feature.
 [[nodiscard]] Result<MfbOutcome> identify_mfb(const IdentifyMfbArguments&, const Progress&);
 
 }  // namespace abbe::daemon

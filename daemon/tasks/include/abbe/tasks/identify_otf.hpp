@@ -1,5 +1,6 @@
 #pragma once
-/// A model from laser tracker points along a path: of one run, of a recording, of several targets.
+/// Identifies a model from laser tracker points along a path: of one run from files, of a
+/// recording, or of runs with several targets.
 
 #include <optional>
 #include <string>
@@ -16,28 +17,30 @@
 
 namespace abbe::daemon {
 
-/// File names and values as a person gives them.
+/// Arguments as given by the user: file names and values.
 struct IdentifyOtfArguments {
   std::string machine, path, tracker, encoder, recording, keep, mode, tables;
-  std::optional<std::string> estimator;  // without a value: that of [otf]
-  std::size_t segment_samples = 0;       // 0: segments by travel
-  std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
-  std::string backlash;                  // empty: that of [otf]
-  std::string smoothness;                // empty: that of [otf]
+  std::optional<std::string> estimator;  // without a value: as in [otf]
+  std::size_t segment_samples = 0;  // 0: segments are formed by travel
+  std::optional<double> u_scale_ppm;  // without a value: as in the configured tracker
+  std::string backlash;  // empty: as in [otf]
+  std::string smoothness;  // empty: as in [otf]
   double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
   std::vector<std::string> targets;          // X,Y,Z=FILE, one per run
-  std::vector<std::string> tracker_centres;  // X,Y,Z of --tracker-centre-mm
-  // without a value: those of the configuration
+  std::vector<std::string> tracker_centres;  // elements of --tracker-centre-mm, "X,Y,Z"
+  // without a value: as in the configuration
   std::optional<calib::Vector3> target_offset_m{}, tracker_position_m{};
-  /// The tracker in the frame of points x_mm, y_mm, z_mm: of all files, or one per target.
+  /// Position of the tracker in the frame of the points x_mm, y_mm, z_mm. One element for all
+  /// files, or one per target.
   std::vector<calib::Vector3> tracker_centres_m{};
   std::string centre_option = "--tracker-centre-mm X,Y,Z";
-  /// What files of other programs do not state: points that were exported, a log of camonitor.
+  /// Information that files of other programs do not contain: for exported points, and for a log of
+  /// camonitor.
   std::string tracker_unit{}, encoder_unit{};
   std::optional<double> tracker_points_per_s{};
   std::vector<std::string> encoder_pvs{};  // X=NAME, Y=NAME, Z=NAME
-  /// Of the file of a target; of one run: 0.
+  /// The element for the file of a target; for a single run `file` is 0.
   [[nodiscard]] std::optional<calib::Vector3> tracker_centre_m(std::size_t file) const {
     if (tracker_centres_m.empty()) return std::nullopt;
     return tracker_centres_m.size() > 1 ? tracker_centres_m.at(file) : tracker_centres_m.front();
@@ -53,10 +56,10 @@ struct OtfOutcome {
   std::optional<calib::otf::Smoothness> smoothness{};
 };
 
-/// For Progress.
+/// The text of the stage that Progress shows.
 [[nodiscard]] std::string_view words(calib::otf::Stage stage);
 
-/// A run that was identified and judged, from files.
+/// A run from files or from a recording, identified and judged.
 struct OtfFromFiles {
   Config config;
   std::vector<InputFile> sources;
@@ -72,13 +75,13 @@ struct OtfFromFiles {
                                                   const Progress& progress);
 
 /// Identifies the last complete run of --recording with the configuration --machine. The recorded
-/// configuration states how the run was acquired, and its reflector and tracker position, unless
-/// the arguments state others.
+/// configuration states how the run was acquired. It also states the reflector and the tracker
+/// position, unless the arguments state others.
 [[nodiscard]] Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments,
                                                      const Progress& progress);
 
-/// The model of the run of the arguments: from several targets, files or a recording. Usage for
-/// arguments that are missing or contradict each other.
+/// Identifies the run that the arguments name: from several targets, from files or from a
+/// recording. Usage if arguments are missing or contradict each other.
 [[nodiscard]] Result<OtfOutcome> identify_otf_from(IdentifyOtfArguments arguments,
                                                    const Progress& progress);
 

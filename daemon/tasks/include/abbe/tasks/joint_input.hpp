@@ -18,23 +18,24 @@ namespace abbe::daemon {
 
 struct IdentifyJointArguments {
   std::string machine, parts, keep;
-  std::optional<std::string> estimator;  // of the runs; without a value: that of [otf]
-  std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
+  std::optional<std::string> estimator;  // estimator for the runs; without a value: as in [otf]
+  std::optional<double> u_scale_ppm;  // without a value: as in the configured tracker
   double false_alarm = calib::joint::JointOptions{}.false_alarm;
   bool scales_corrected = false, accept_path_orientation = false;
 };
 
-/// What the report states about a part.
+/// Facts about a part for the report.
 struct PartFacts {
   std::string name, method, files;
   std::size_t observations = 0;
   std::optional<calib::VolumetricModel> own_model{};  ///< tables; nullopt for an array or a bar
-  calib::Verdict verdict;                             ///< on the part alone
+  calib::Verdict verdict;  ///< verdict on this part alone
 };
 
 struct JointInput {
   JointInput() = default;
-  // `runs` points into `observations`, whose elements stay where they are when it is moved.
+  // Moving is possible although `runs` points to elements of `observations`: these elements keep
+  // their addresses when the deque is moved.
   JointInput(JointInput&&) = default;
   JointInput& operator=(JointInput&&) = default;
   JointInput(const JointInput&) = delete;
@@ -43,15 +44,18 @@ struct JointInput {
 
   Config config;
   std::vector<InputFile> sources;
-  std::optional<calib::joint::CommonTables> common{};   ///< of the first run
+  std::optional<calib::joint::CommonTables> common{};  ///< common tables of the first run
   std::vector<calib::joint::Part> parts{};              ///< runs, arrays, bars
   std::vector<PartFacts> facts{};                       ///< one per part
-  std::deque<calib::otf::Observations> observations{};  ///< of the runs; `runs` points to them
+  /// observations of the runs; `runs` points to them
+  std::deque<calib::otf::Observations> observations{};
   std::vector<calib::joint::RunOfPart> runs{};
-  std::optional<MeaningEntries> recorded_readings{};  ///< of the first recorded run
+  /// meaning of the readings in the first recorded run
+  std::optional<MeaningEntries> recorded_readings{};
 };
 
-/// Errors of a part begin with its name. Io, BadInput with file and line, DataInsufficient.
+/// The text of an error about a part begins with the name of the part. Errors: Io; BadInput with
+/// file and line; DataInsufficient.
 [[nodiscard]] Result<JointInput> read_joint_input(const IdentifyJointArguments&, const Progress&);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// The result of a joint identification as text, JSON and tables of the report.
+/// The result of a joint identification as text, as JSON and as tables of the report.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -11,7 +11,7 @@
 
 namespace abbe::daemon {
 
-/// "0.123 um", or that the tables are not determined.
+/// The standard uncertainty as text, "0.123 um", or a text that the tables are not determined.
 [[nodiscard]] std::string u_text(const std::optional<double>& u_m);
 /// Standard uncertainty of V of the joint model, rms over the nodes.
 [[nodiscard]] double u_of_joint_m(const JointOutcome&);
@@ -22,7 +22,7 @@ namespace abbe::daemon {
 [[nodiscard]] nlohmann::json directed_json(const JointInput&,
                                            const std::vector<calib::joint::DirectedTest>&);
 [[nodiscard]] nlohmann::json joint_json(const JointOutcome&, const std::filesystem::path& folder);
-/// For the report: the parts, whether they agree, and the uncertainty of each table.
+/// Tables for the report: the parts, their agreement, and the uncertainty of each table.
 [[nodiscard]] std::vector<RunFigures::Table> joint_tables(const JointOutcome&);
 
 }  // namespace abbe::daemon

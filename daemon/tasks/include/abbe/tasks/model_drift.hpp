@@ -1,5 +1,5 @@
 #pragma once
-/// Has the machine changed from one model to a later one?
+/// Tests whether the machine has changed between an earlier and a later model.
 
 #include <string>
 
@@ -13,17 +13,18 @@ namespace abbe::daemon {
 struct ModelDriftArguments {
   std::string a, b;
   StoreOption store{};
-  double false_alarm = calib::DriftOptions{}.false_alarm;  ///< probability
+  double false_alarm = calib::DriftOptions{}.false_alarm;  ///< probability of a false alarm
   bool other_machine = false;
 };
 
 struct ModelDrift {
   calib::DriftTest test;
   std::string machine_a, machine_b;
-  std::string different_machines;  ///< empty: they are the same
+  /// text that the models are of different machines; empty: they are of the same machine
+  std::string different_machines;
 };
 
-/// Usage: models of different machines that `other_machine` does not allow. DataInsufficient: the
+/// Usage: models of different machines although `other_machine` is false. DataInsufficient: the
 /// models cannot be compared table by table. BadInput: `false_alarm` is not between 0 and 1.
 [[nodiscard]] Result<ModelDrift> model_drift(const ModelDriftArguments&);
 

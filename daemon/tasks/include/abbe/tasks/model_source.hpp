@@ -1,5 +1,5 @@
 #pragma once
-/// Where a model comes from: a file, or a model of a store.
+/// Finds a model by its name: a file, or a model of a store.
 
 #include <filesystem>
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace abbe::daemon {
 
-/// The folder of a store, or, if not empty, the abbed.toml that names it.
+/// The folder of a store; or, if `config` is not empty, the abbed.toml that names the folder.
 struct StoreOption {
   std::string folder = "/var/lib/abbe/models";
   std::string config;
@@ -27,19 +27,19 @@ struct StoreOption {
 /// True if `name` is a path with a folder, has an extension, or is the name of an existing file.
 [[nodiscard]] bool names_a_file(const std::string& name);
 
-/// machine_hash() of the abbed.toml of -c; nullopt without -c.
+/// machine_hash() of the abbed.toml given with option -c; nullopt without -c.
 [[nodiscard]] Result<std::optional<std::string>> machine_hash_of(const StoreOption& where);
 
-/// The file of a model: `name` itself if it is a path, else that in the store; empty if there is
-/// none.
+/// The file of a model: `name` itself if it is a path, else the file in the store. Empty if there
+/// is none.
 [[nodiscard]] std::filesystem::path file_of_model(const std::string& name,
                                                   const StoreOption& where);
 
-/// A model with what its store and the configuration know of it.
+/// A model, with information about it from its store and the configuration.
 struct FoundModel {
   ModelDocument document;
   std::vector<StoreEvent> events;           ///< empty for a file
-  std::optional<std::string> machine_hash;  ///< of the abbed.toml of -c
+  std::optional<std::string> machine_hash;  ///< machine_hash() of the abbed.toml given with -c
   std::string identity_doubt{};             ///< ModelInUse::identity_doubt; empty for a file
 
   [[nodiscard]] ModelInUse in_use(ModelPurpose purpose) const {
@@ -51,9 +51,10 @@ struct FoundModel {
 /// name that looks like a path is never looked up in the store. The verdict is that of the store.
 [[nodiscard]] Result<FoundModel> found_model(const std::string& name, const StoreOption& where);
 
-/// What a person who looks at the model must know; empty for an accepted one without restrictions.
+/// Facts that a person must know who looks at the model. Empty for an accepted model without
+/// restrictions.
 [[nodiscard]] std::vector<std::string> cautions_of(const FoundModel& model);
-/// Called with the name of a model and what a person must know of it.
+/// Called with the name of a model, if it has cautions.
 using ShowCautions = std::function<void(const std::string& name, const FoundModel& model)>;
 
 }  // namespace abbe::daemon

@@ -22,9 +22,9 @@ struct OpenedRecording {
 [[nodiscard]] Result<OpenedRecording> open_recording(const std::string& file,
                                                      const std::string& config = {});
 
-/// The samples of a recording have the meaning that the recorded configuration gives them, and may
-/// be of simulated devices, whatever `config` says of the devices. null: the recorded configuration
-/// cannot be read.
+/// Sets in `config` the meaning of the readings, and whether devices are simulated, from the
+/// recorded configuration. This is necessary because the samples of a recording have the meaning
+/// that the recorded configuration gives them. null: the recorded configuration cannot be read.
 void take_recorded_readings(Config& config, const Config* recorded);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// HTML to PDF with a program that is installed: weasyprint or chromium.
+/// Converts HTML to PDF with an installed program: weasyprint or chromium.
 
 #include <filesystem>
 #include <string>
@@ -9,13 +9,13 @@
 
 namespace abbe::daemon {
 
-/// Call it before a result is stored whose report becomes `pdf`: Io if no converter is installed,
-/// or if there is no folder for the file.
+/// Checks that write_pdf() can succeed. Call it before a result is stored. Io if no converter is
+/// installed, or if the folder of `pdf` does not exist.
 [[nodiscard]] Result<void> check_pdf(const std::filesystem::path& pdf);
 
 /// Writes `pdf`. Io if no converter is installed, or if it fails or takes longer than three
-/// minutes. The converter reports nothing: `progress` gets the time that it has taken, as a share
-/// of that time and 10 s. It takes a few seconds for a report.
+/// minutes. The converter reports no progress. `progress` therefore gets t / (t + 10 s), where t is
+/// the time so far. A report takes a few seconds.
 [[nodiscard]] Result<void> write_pdf(const std::string& html, const std::filesystem::path& pdf,
                                      const Progress& progress = {});
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The options of `abbe plan mfb`, and the plan that they stand for.
+/// The options of `abbe plan mfb`, and the plan that they describe.
 
 #include <cstddef>
 #include <string>
@@ -31,13 +31,13 @@ struct PlanInputs {
   calib::mfb::Bar bar;
 };
 
-/// The words of PlanMfbArguments::set.
+/// The allowed values of PlanMfbArguments::set.
 [[nodiscard]] std::vector<std::string> bar_plan_sets();
 [[nodiscard]] Result<PlanInputs> bar_plan_inputs(const PlanMfbArguments& arguments);
-/// The plan of the file --check, with its prediction.
+/// The plan in the file of option --check, with its prediction.
 [[nodiscard]] Result<BarPlan> judged_bar_plan(const PlanMfbArguments& arguments,
                                               const PlanInputs& inputs);
-/// A new plan.
+/// Makes a new plan.
 [[nodiscard]] Result<BarPlan> plan_mfb(const PlanMfbArguments& arguments, const PlanInputs& inputs,
                                        const Progress& progress);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// A path for a calibration on the fly, planned or given, with the uncertainty that it will give.
+/// A path for an on-the-fly calibration, planned or given, with the predicted uncertainty.
 
 #include <cstddef>
 #include <optional>
@@ -15,9 +15,10 @@ namespace abbe::daemon {
 
 inline constexpr double kMinute_s = 60.0;
 
-/// As a person gives them; lengths in the unit of the name.
+/// Arguments as given by the user; lengths in the unit of their name.
 struct PlanOtfArguments {
-  std::string machine, path;  ///< files; without `machine`: chain, tool and travel below
+  /// files; without `machine` the chain, tool and travel below are used
+  std::string machine, path;
   std::string chain = "[w b X Y Z t]", tool = "0,0,0";
   std::vector<double> travel_mm;
   double node_spacing_mm = 50.0;
@@ -35,14 +36,15 @@ struct PathPlan {
   calib::otf::Path path;
   calib::otf::Prediction prediction;
   tl::expected<calib::otf::Prediction, calib::Error> base;
-  std::vector<std::pair<calib::Vector3, double>> trackers;  ///< position, rms_u_m
+  /// position of a tracker, and the rms of the predicted standard uncertainty
+  std::vector<std::pair<calib::Vector3, double>> trackers;
   std::size_t corners_not_reached = 0;
   bool ended_early = false;  ///< by Progress::stopped()
 };
 
-/// With `arguments.path` a prediction of that path, else a new path: the best one found until it is
-/// `progress.stopped()`. Usage: the place of the tracker is not known. DataInsufficient: stopped
-/// before there was a path.
+/// If `arguments.path` is given: a prediction for this path. Else a new path: the best path found
+/// until the search ends or `progress.stopped()` is true. Usage: the position of the tracker is not
+/// known. DataInsufficient: stopped before a path was found.
 [[nodiscard]] Result<PathPlan> plan_otf(const PlanOtfArguments&, const Progress&);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// The progress that a task reports, and the wish to stop it.
+/// Reports the progress of a task, and tells the task when to stop.
 
 #include <functional>
 #include <string_view>
@@ -7,9 +7,9 @@
 
 namespace abbe::daemon {
 
-/// Receives the step that is under way and its share, 0 to 1, and states whether the task is to
-/// stop. A task calls it from the thread that runs the task. Without functions nothing is shown and
-/// no task is stopped.
+/// Receives the present step and the fraction of it that is done, 0 to 1, and states whether the
+/// task must stop. A task calls it from the thread that runs the task. Without functions, nothing
+/// is shown and no task is stopped.
 class Progress {
  public:
   using Show = std::function<void(std::string_view step, double share)>;
@@ -22,8 +22,8 @@ class Progress {
   void show(std::string_view step, double share) const {
     if (show_) show_(step, share);
   }
-  /// True: a task that says so returns an Error soon, or what it has found so far. Once true, it
-  /// must stay true.
+  /// True: the task must stop. A task that supports this soon returns an Error, or the result found
+  /// so far. Once true, the value must stay true.
   [[nodiscard]] bool stopped() const { return stopped_ && stopped_(); }
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// A recording replayed, and what it gave compared with the live run.
+/// Replays a recording and compares the result with that of the live run.
 
 #include <chrono>
 #include <functional>
@@ -16,10 +16,11 @@ namespace abbe::daemon {
 
 struct ReplayArguments {
   std::string file;
-  std::string config;  ///< file read instead of the recorded configuration; empty: the recorded one
+  /// configuration file used instead of the recorded configuration; empty: the recorded one
+  std::string config;
   bool raw = false;    ///< from the raw bytes of the devices instead of the decoded samples
   double speed = 0.0;  ///< recorded time per real time; 0: as fast as possible
-  /// ReplayOptions::samples; if set, the samples are what the replay is for
+  /// ReplayOptions::samples; if set, only the samples are wanted, not the models
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples = {};
 };
 
@@ -34,7 +35,7 @@ struct ReplayedRecording {
 using ShowLoss = std::function<void(const RecordingLoss&)>;
 
 /// Writes no file. Io or BadInput if the file or its configuration cannot be read, or the file
-/// becomes shorter while it is read. DataInsufficient soon after progress.stopped().
+/// becomes shorter while it is read. DataInsufficient if progress.stopped() ended the replay.
 [[nodiscard]] Result<ReplayedRecording> replay_recording(const ReplayArguments& arguments,
                                                          const ShowLoss& show_loss,
                                                          const Progress& progress);
@@ -46,7 +47,7 @@ using ShowLoss = std::function<void(const RecordingLoss&)>;
 /// or, with the recorded configuration, if the model differs from that of the live run.
 [[nodiscard]] bool is_confirmed(const ReplayedRecording&, const ReplayArguments&);
 
-/// One object, as `abbe replay --json` prints it.
+/// One JSON object, as `abbe replay --json` prints it.
 [[nodiscard]] nlohmann::json replay_json(const ReplayedRecording&);
 
 }  // namespace abbe::daemon

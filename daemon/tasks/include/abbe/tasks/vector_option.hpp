@@ -1,5 +1,5 @@
 #pragma once
-/// Options of three numbers, "x,y,z" in mm.
+/// Reads options of three numbers, "x,y,z" in mm.
 
 #include <string>
 

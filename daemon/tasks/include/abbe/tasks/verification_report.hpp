@@ -16,36 +16,37 @@
 
 namespace abbe::daemon {
 
-/// A model at the places that are compared.
+/// A model, with its errors at the places that are compared.
 struct ModelAtPoints {
   ComparedModel model;
   calib::Vector3 tool_m = calib::Vector3::Zero();
   calib::verify::Comparison comparison{};
 };
 
-/// One model, compared also on a grid; or several at the same places, those that are inside the
-/// validity volume of every one.
+/// The result for one model, which is also compared on a grid, or for several models at the same
+/// places. Only places inside the validity volume of every model are compared.
 struct Verification {
   std::vector<ModelAtPoints> models;         ///< in the order of the arguments; at least one
-  calib::verify::Observations observations;  ///< of all places
-  std::size_t inside = 0;                    ///< places that are compared
+  calib::verify::Observations observations;  ///< observations at all places
+  std::size_t inside = 0;  ///< number of places that are compared
   std::vector<InputFile> inputs;
   std::vector<std::size_t> lines;  ///< line numbers of the shots in their file; may be empty
   std::size_t repeated = 0;        ///< rows of the file that repeat another row and are left out
-  /// Points that alone do not fit the model, one line each; empty for several models.
+  /// Single points that do not fit the model, one line each; empty for several models.
   std::vector<std::string> points_off;
-  /// Usual mistakes in the points with which they fit the model far better, one line each; empty
-  /// for several models.
+  /// Usual mistakes in the points that would explain the differences: with the mistake corrected,
+  /// the points fit the model far better. One line each; empty for several models.
   std::vector<std::string> likely_mistakes;
-  /// why some points are missing or may be wrong; empty: all are complete
+  /// why points are missing or may be wrong; empty: all points are complete
   std::string cut_short;
-  std::string different_machines;  ///< different_machines(); of one model also one of its cautions
+  /// result of different_machines(); for one model it is also one of its cautions
+  std::string different_machines;
   /// Positions of the planes in which the vectors are drawn, one coordinate per axis; default: the
   /// middle of the grid.
   std::optional<calib::Vector3> planes_m;
   CertificateDetails details{};  ///< of certificate.toml; empty: not given
 
-  /// Of the first model.
+  /// The comparison of the first model.
   [[nodiscard]] const calib::verify::Comparison& comparison() const {
     return models.front().comparison;
   }
@@ -55,25 +56,26 @@ struct Verification {
 /// without it; 340 of 343 places improved".
 [[nodiscard]] std::string verdict_text(const calib::verify::Comparison&);
 
-/// How many shots there are, and their repeatability: "348 shots at 343 places, 1 to 6 each; their
+/// The number of shots and their repeatability: "348 shots at 343 places, 1 to 6 each; their
 /// standard deviation about the means of their places is 1.20 um (3-D)".
 [[nodiscard]] std::string shots_text(const calib::verify::Observations&);
 
-/// Why the report does not give R_resmag (residual / error without compensation); nullopt if it
-/// does.
+/// The reason why the report does not give R_resmag (residual / error without compensation);
+/// nullopt if it gives it.
 [[nodiscard]] std::optional<std::string> why_no_ratio(const calib::verify::Comparison&);
 
-/// A residual of the first model beside its limit of `[verification]`. Lengths in um.
+/// A residual of the first model with its limit from `[verification]`. Lengths in um.
 struct JudgedResidual {
   std::string name;  ///< "rms", "largest"
   double value_um = 0.0, U_um = 0.0, limit_um = 0.0;
   Conformity conformity = Conformity::Neither;
 };
-/// With the guard band of ISO 14253-1, and U of calib::verify::expanded_uncertainty(). Never a pass
-/// while a usual mistake is likely or points are missing. Empty: no limits are stated.
+/// Judges the residuals with the guard band of ISO 14253-1 and the U of
+/// calib::verify::expanded_uncertainty(). The result is never a pass while a usual mistake is
+/// likely or points are missing. Empty: no limits are stated.
 [[nodiscard]] std::vector<JudgedResidual> judged_residuals(const Verification&);
 
-/// The text of report.html of the first model, a page that needs no other file and begins with the
+/// The text of report.html for the first model. The page needs no other file and begins with the
 /// verdict.
 [[nodiscard]] std::string verification_report(const Verification&);
 

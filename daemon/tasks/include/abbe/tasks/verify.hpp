@@ -1,5 +1,5 @@
 #pragma once
-/// A model against independent measurements at points in the volume.
+/// Compares a model with independent measurements at points in the volume.
 
 #include <functional>
 #include <optional>
@@ -15,44 +15,46 @@
 namespace abbe::daemon {
 
 struct LivePoints {
-  VerificationFile file;  ///< for points of the daemon `source` has no name
+  VerificationFile file;  ///< for points measured by the daemon, `source` has no name
   /// Why points are missing: the daemon does not answer any more (Io), or the recording is damaged
   /// before its end (DataInsufficient).
   std::optional<Error> cut_short;
-  std::string machine{};  ///< whose points they are; empty: not known
+  std::string machine{};  ///< machine on which the points were measured; empty: not known
 };
 
-/// Called with all points whenever there are new ones; an error ends the measurement.
+/// Called with all points whenever there are new ones. If it returns an Error, the measurement
+/// ends.
 using KeepPoints = std::function<Result<void>(const VerificationFile&)>;
-/// Called with the machine of the points (empty: not known) before the first; its error is
-/// returned.
+/// Called before the first point, with the machine on which the points are measured (empty: not
+/// known). An Error that it returns ends the measurement.
 using AcceptMachine = std::function<Result<void>(const std::string& machine)>;
 
-/// File names and values as a person gives them; one of points, recording and live.
+/// Arguments as given by the user: file names and values. Exactly one of points, recording and live
+/// is given.
 struct VerifyArguments {
   std::vector<std::string> models;
   std::string points, recording;
   /// Measures points on the running machine.
   std::function<Result<LivePoints>(const KeepPoints&, const AcceptMachine&)> live{};
-  std::string out;      ///< folder for measured points; empty: they are not kept
+  std::string out;  ///< folder in which measured points are kept; empty: they are not kept
   std::string details;  ///< certificate.toml; empty: none
   std::string tool, frame = "fit", origin, grid, planes;
   std::optional<double> least_distance_mm{};
   StoreOption store{};
   bool other_machine = false;
-  /// Of points that another program exported: file of the readings, unit. Such points also need a
-  /// stated `frame`.
+  /// For points that another program exported: the file with the readings, and the unit.
+  /// `frame_stated` must then be true.
   std::string readings{}, points_unit{};
   bool frame_stated = false;
 };
 
-/// One model, or several at the same points, for example of runs at several feeds. Usage: no
-/// model, not exactly one source of points, live points without `out`, a vector that is none, models
-/// of different machines without `other_machine`, an argument that is for one model, different tool
-/// offsets of the models without `arguments.tool`.
-/// DataInsufficient: fewer than 4 places inside the validity volume of all models. Sets `cut_short`
-/// if points are missing, even if the comparison fails: the missing points may be the cause of its
-/// failure.
+/// Compares one model, or several models at the same points (for example models of runs at several
+/// feeds). Usage: no model; not exactly one source of points; live points without `out`; an invalid
+/// vector; models of different machines without `other_machine`; with several models, an argument
+/// that is only for one model, or different tool offsets without `arguments.tool`.
+/// DataInsufficient: fewer than 4 places inside the validity volume of all models.
+/// `cut_short` is set if points are missing, even if the comparison fails, because the missing
+/// points may be the cause of the failure.
 [[nodiscard]] Result<Verification> verify_models(const VerifyArguments& arguments,
                                                  std::optional<Error>& cut_short,
                                                  const Progress& progress);

@@ -27,7 +27,7 @@ class AxisPresence {
     forget();
   }
 
-  /// The bus was closed: no axis is current.
+  /// Call it when the bus was closed: no axis is then current.
   void forget() ABBE_RT { missed_.fill(limit_); }
   void on_sample(const protocol::AxisSample& sample) ABBE_RT {
     for (std::size_t i = 0; i < axes_; ++i) {

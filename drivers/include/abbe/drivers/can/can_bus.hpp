@@ -28,7 +28,7 @@ struct ReceivedFrame {
   bool echo = false;
 };
 
-/// Losses and refusals since construction; the counters never decrease.
+/// Numbers of losses and refusals since construction.
 struct CanBusCounters {
   std::uint64_t lost = 0;               ///< the kernel's queue was full, or datagrams are missing
   std::uint64_t refused = 0;            ///< datagrams that contain no valid CAN frames

@@ -33,7 +33,7 @@ class EmergencyReports {
   struct Node {
     std::string axis;
     can::NodeId id = 0;
-    std::uint16_t code = 0;  ///< 0: none, or error reset
+    std::uint16_t code = 0;  ///< the latest emergency code; 0: none, or error reset
     std::optional<can::Emergency> latest;
     std::optional<protocol::HostTime> reported_at;
     unsigned unreported = 0;

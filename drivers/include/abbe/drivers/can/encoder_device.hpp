@@ -65,7 +65,7 @@ struct EncoderDeviceOptions {
   SyncSource sync = SyncSource::Thread;
   /// wait before the bus is opened again after a failure of the transport
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
-  /// Why answers to several SYNCs come at once, and what to do, for the fault.
+  /// Text for the fault "answers to several SYNCs come at once": the likely cause and the remedy.
   std::string delay_advice =
       "the tunnel delays frames (cannelloni: set -t, in us, well below the SYNC period)";
   std::size_t sample_capacity = 8192;  ///< 8 s at 1 kHz
@@ -84,7 +84,7 @@ class EncoderDevice final : public Device {
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
 
-  /// One reader each.
+  /// Each ring has one reader.
   [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
   /// Only for the device thread.
@@ -106,8 +106,8 @@ class EncoderDevice final : public Device {
   void follow_external_sync(protocol::HostTime now);
   void send_sync();
   void follow_kernel_sync();
-  /// The latest report of a kind of fault that can occur with every frame. Such a fault is reported
-  /// at most once a second, with its count.
+  /// The latest fault of a kind that can occur with every frame. It is reported at most once a
+  /// second, with its count.
   struct Reported {
     std::uint64_t count = 0;
     std::optional<protocol::HostTime> at;
@@ -146,7 +146,7 @@ class EncoderDevice final : public Device {
   std::string condition_;  ///< the text last written to board_
 
   bool open_ = false;
-  bool sending_ = false;  ///< the supervisor runs
+  bool sending_ = false;  ///< the supervisor runs and may send
   bool bus_was_off_ = false;
   protocol::HostTime off_since_{};
   /// The bus was opened again after bus-off, which restarts the controller; receiver_ still reports
@@ -174,7 +174,8 @@ class EncoderDevice final : public Device {
   std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< for the receiver
   std::size_t batch_count_ = 0;
   bool all_read_ = true;            ///< CanRead::all
-  protocol::HostTime cycle_end_{};  ///< if all_read_: earlier frames were read
+  /// valid if all_read_: all frames that arrived earlier were read
+  protocol::HostTime cycle_end_{};
   std::uint8_t raw_sequence_ = 0;
   std::array<std::byte, protocol::RawBlock::kCapacity> datagram_{};
 };

@@ -78,8 +78,9 @@ struct EncoderAxis {
   /// if it reports none, its revolution if it is a single-turn encoder, else 2^32 (2^64 for a
   /// position of 64 bits).
   std::uint64_t wrap_counts = 0;
-  /// Rotary: the middle of the travel, rad. The first count is moved by whole ranges (wrap_counts)
-  /// so that its reading is next to it. None: the first count is used as sent.
+  /// For a rotary axis: the middle of its travel, rad. The first count is moved by whole ranges
+  /// (wrap_counts) so that its reading is nearest to the middle. nullopt: the first count is used
+  /// as sent.
   std::optional<double> middle{};
   std::optional<std::uint32_t> serial{};  ///< compared with the encoder's if set
 };
@@ -108,7 +109,7 @@ struct EncoderReceiverOptions {
   return sync_period / 50;
 }
 
-/// Since construction.
+/// Numbers of events since construction.
 struct EncoderCounters {
   std::uint64_t samples = 0;
   std::uint64_t missing_answers = 0;  ///< axes x cycles, including doubtful answers
@@ -199,7 +200,8 @@ class EncoderReceiver {
     bool seen = false;
     bool answers = false;             ///< node has answered since boot-up or the last SYNC pause
     bool reply_outstanding = false;   ///< the answer to an earlier SYNC may still arrive
-    std::uint8_t cycles_to_hold = 0;  ///< regular cycles until the axis is settled; 0: it is
+    /// regular cycles until the axis is settled; 0: it is settled
+    std::uint8_t cycles_to_hold = 0;
     std::uint64_t raw = 0;            ///< the latest count as sent, modulo `modulus`
     std::uint16_t emergency = 0;      ///< the latest code; 0: none
     bool heartbeat_lost = false;

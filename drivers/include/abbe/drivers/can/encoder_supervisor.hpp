@@ -37,13 +37,13 @@ class EncoderSupervisor {
   /// supervisor by its own node ID (node ID 0 would address every drive on the bus), then
   /// configures the nodes.
   void bus_recovered(protocol::HostTime now);
-  /// A SYNC was sent at `now`: configured nodes must answer it.
+  /// A SYNC was sent at `now`; configured nodes must answer it.
   void on_sync(protocol::HostTime now);
   void on_frame(const can::CanFrame& frame, protocol::HostTime now);
   /// Precondition: all frames that arrived before `now` were passed to on_frame().
   void on_time(protocol::HostTime now);
   [[nodiscard]] std::optional<can::CanFrame> take_frame();
-  /// When on_time() must be called next.
+  /// The time at which on_time() must be called next.
   [[nodiscard]] protocol::HostTime deadline() const;
 
   [[nodiscard]] std::size_t nodes() const { return nodes_.size(); }
@@ -63,7 +63,8 @@ class EncoderSupervisor {
     protocol::HostTime started{};
     protocol::HostTime retry_at{};
     protocol::HostTime ready_at{};
-    std::optional<protocol::HostTime> unanswered_sync;  ///< the first one
+    /// time of the first SYNC that was not answered
+    std::optional<protocol::HostTime> unanswered_sync;
     unsigned idle_beats = 0;  ///< consecutive heartbeats other than "operational"
     can::ConfigurationFault reported = can::ConfigurationFault::None;
   };

@@ -41,7 +41,7 @@ class ForeignSync {
   void heard(protocol::HostTime at);
   /// Precondition: every SYNC that arrived before `now` was passed to heard().
   [[nodiscard]] bool may_send(protocol::HostTime now);
-  /// When may_send() can become true; HostTime::max() if it is true.
+  /// The time at which may_send() can become true; HostTime::max() if it is true.
   [[nodiscard]] protocol::HostTime deadline() const;
 
   [[nodiscard]] bool present() const { return count_ > 0; }

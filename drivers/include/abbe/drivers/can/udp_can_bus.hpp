@@ -19,8 +19,8 @@
 namespace abbe::drivers {
 
 struct UdpCanOptions {
-  /// The default address receives on every network interface. Whatever the address, only datagrams
-  /// from the peer's address and port are accepted.
+  /// The address of this computer on which datagrams are received; the default means every network
+  /// interface. With any address, only datagrams from the peer's address and port are accepted.
   std::string local_address = "0.0.0.0";
   std::uint16_t local_port = 0;            ///< 0: the kernel chooses, see local_port()
   std::string peer_address = "127.0.0.1";  ///< IPv4 address, or a name that open() resolves

@@ -23,18 +23,17 @@ class LatchTracker {
     reset();
   }
 
-  /// The counters were zeroed.
+  /// Call it when the counters were zeroed.
   void reset() ABBE_RT;
-  /// Begins in the middle of a stream: `latch_raw` is the present reading, which is not a new edge.
+  /// Starts in the middle of a stream: `latch_raw` is the present reading, which is not a new edge.
   void begin_at(std::uint64_t latch_raw) ABBE_RT { last_raw_ = latch_raw; }
 
   struct Latch {
     std::int64_t clock_count = 0;  ///< unwrapped, of the clock channel
     std::int64_t half_width = 0;   ///< the true value is clock_count +- half_width
   };
-  /// To be called for every scan in order, with the readings of both channels and the unwrapped
-  /// clock counts of this and of the previous scan. True: the latch has changed since the previous
-  /// scan.
+  /// Call it for every scan in order, with the readings of both channels and the unwrapped clock
+  /// counts of this and of the previous scan. True: the latch has changed since the previous scan.
   bool on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw, std::int64_t clock_count,
                std::int64_t previous_clock_count) ABBE_RT;
   /// The latest latch; nullopt before the first edge.

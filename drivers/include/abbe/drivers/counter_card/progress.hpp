@@ -1,6 +1,6 @@
 #pragma once
 /// State of a card's counters at one scan. A later run of the program uses it to detect whether the
-/// counters have continued. Counts as in CounterScan.
+/// counters have continued. Counts are unwrapped as in CounterScan.
 
 #include <array>
 #include <cstddef>
@@ -13,7 +13,8 @@
 namespace abbe::drivers {
 
 struct CounterCardProgress {
-  protocol::SampleHead head;  ///< `time`: host time of the scan, by a settled clock model
+  /// `time` is the host time of the scan, converted by a settled clock model
+  protocol::SampleHead head;
   std::int64_t clock_count = 0;
   std::uint8_t axis_count = 0;
   std::array<std::int64_t, protocol::kMaxAxes> count{};

@@ -49,7 +49,7 @@ struct CounterCardReceiverOptions {
   std::optional<CounterCardProgress> resume_from;
 };
 
-/// Since construction.
+/// Numbers of events since construction.
 struct CounterCardCounters {
   std::uint64_t scans = 0;
   std::uint64_t gaps = 0;
@@ -68,22 +68,21 @@ class CounterCardReceiver {
   static constexpr std::size_t kLongestTransfer = 65536;
   static constexpr std::size_t kLongestMessage = protocol::usbip::kUrbHeaderSize + kLongestTransfer;
 
-  /// `options.wiring` has passed check().
+  /// Precondition: `options.wiring` has passed check().
   explicit CounterCardReceiver(const CounterCardReceiverOptions& options);
   CounterCardReceiver(const CounterCardReceiver&) = delete;
   CounterCardReceiver& operator=(const CounterCardReceiver&) = delete;
 
-  /// To be called for every control request to the card: reading the firmware version opens the
-  /// card, a counter set-up zeroes the counters, and a start of the data transfer restarts the
-  /// stream.
+  /// Call it for every control request to the card: reading the firmware version opens the card, a
+  /// counter set-up zeroes the counters, and a start of the data transfer restarts the stream.
   void on_control(const protocol::usb::Setup& setup) ABBE_RT;
   /// Takes bytes of the scan endpoint. Call next() until it returns an empty span; the bytes must
   /// stay valid until then.
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
   /// The next scans in order, valid until the next call; empty: all pushed bytes are processed.
   [[nodiscard]] std::span<const CounterScan> next() ABBE_RT;
-  /// To be called where bytes of a recording are missing: searches for the beginning of the next
-  /// scan.
+  /// Call it where bytes of a recording are missing. The receiver then searches for the beginning
+  /// of the next scan.
   void bytes_lost() ABBE_RT;
 
   /// True if the received bytes are not scans. Further bytes are ignored until the stream restarts.
@@ -118,13 +117,13 @@ class CounterCardReceiver {
   };
   /// Counters of an earlier run, until it is known whether they have continued.
   struct Resumption {
-    protocol::HostTime since{};               ///< of `last_`
+    protocol::HostTime since{};  ///< time of `last_`
     std::optional<protocol::HostTime> begun;  ///< arrival of the first withheld scan
     double least_behind_s = 0.0;
     bool refused = false;
   };
   struct LongGap {
-    std::int64_t clock_count = 0;  ///< of the scan after the gap
+    std::int64_t clock_count = 0;  ///< clock count of the scan after the gap
     double length_s = 0.0;
   };
 
@@ -171,16 +170,17 @@ class CounterCardReceiver {
   CounterCardCounters counters_;
 
   quad08::ScanDecoder decoder_;
-  std::span<const std::byte> pending_;  ///< pushed, not yet decoded
+  std::span<const std::byte> pending_;  ///< pushed, but not yet decoded
   protocol::HostTime arrival_{};
   bool seeking_ = true;
-  std::array<std::byte, 512> window_{};  ///< while seeking
+  /// used while the receiver searches for the beginning of a scan
+  std::array<std::byte, 512> window_{};
   std::size_t window_filled_ = 0;
 
   bool out_of_step_ = false;
   std::uint64_t refused_step_ = 0;
   std::size_t refused_run_ = 0;
-  std::optional<quad08::RawScan> last_;  ///< accepted
+  std::optional<quad08::RawScan> last_;  ///< the last accepted scan
   bool reopened_ = false;                ///< the card was opened again since `last_`
   std::optional<Resumption> resumption_;
   double behind_s_ = 0.0;

@@ -86,7 +86,7 @@ enum class CardState : std::uint8_t {
   Loading,    ///< stops a running scan, loads scan list and pacer
   Arming,     ///< starts data transfer and scan list, waits until the card is ready
   Streaming,
-  Halting,  ///< stops the scan before a restart: from Streaming to Loading
+  Halting,  ///< halts the scan before a restart: from Streaming to Loading
 };
 /// A string literal, for DeviceStatus.
 [[nodiscard]] const char* name_of(CardState state) noexcept;
@@ -96,7 +96,7 @@ class CounterCardSession {
   explicit CounterCardSession(const CounterCardSessionOptions& options);
 
   [[nodiscard]] CardAction on(const CardInput& input, protocol::HostTime now);
-  /// When the next CardTick is due.
+  /// The time at which the next CardTick is due.
   [[nodiscard]] protocol::HostTime deadline() const {
     return std::min(awaited_.next(), planned_.next(waiting()));
   }
@@ -110,7 +110,7 @@ class CounterCardSession {
 
   struct Fault {
     std::uint64_t count = 0;
-    std::string text;  ///< of the latest
+    std::string text;  ///< text of the latest fault
   };
   [[nodiscard]] const Fault& fault() const { return fault_; }
   /// Number of restarts of the scan.
@@ -166,15 +166,16 @@ class CounterCardSession {
   std::size_t step_ = 0;
   bool asked_ = false;  ///< a control transfer is pending
   bool stopping_bulk_ = false;
-  bool halt_ = false;  ///< halt the scan as soon as the pending control transfer is answered
+  /// the scan must be halted as soon as the pending control transfer is answered
+  bool halt_ = false;
   bool scans_since_fault_ = false;
   bool set_up_ = false;  ///< this session or an earlier run has set the counters up
-  std::string serial_;   ///< of the card whose counters were set up
+  std::string serial_;  ///< serial number of the card whose counters were set up
   /// The card was opened with counters set up before; no scan has confirmed yet that they continue.
   bool resuming_ = false;
   bool resumed_again_ = false;  ///< the scan was restarted once because it was out of step
   unsigned status_tries_ = 0;
-  unsigned tries_ = 0;  ///< of the pending control transfer
+  unsigned tries_ = 0;  ///< number of attempts for the pending control transfer
   Deadlines<Input::Scans> awaited_;
   Deadlines<Plan::Status> planned_;
   Fault fault_;

@@ -33,7 +33,7 @@ struct CounterAxis {
   /// true: the counter delivers its count at the latest index pulse instead of its live count. For
   /// reference marks.
   bool latch_on_index = false;
-  quad08::Debounce debounce{};  ///< of phases and index
+  quad08::Debounce debounce{};  ///< debounce of phases and index
 };
 
 enum class ClockSource : std::uint8_t {
@@ -56,7 +56,8 @@ struct CounterCardWiring {
   std::optional<std::uint8_t> edge_channel;
   quad08::Debounce latch_debounce{};  ///< of the index input of the latch channel
   quad08::Debounce edge_debounce{};
-  bool latch_verified = false;  ///< the ASSUMPTION at the top was verified on this card
+  /// the ASSUMPTION at the top of this file was verified on this card
+  bool latch_verified = false;
   quad08::CountWidth width = quad08::CountWidth::Bits32;
   double scan_rate_hz = 100e3 / 3.0;  ///< requested; the actual rate is scan_rate_hz()
 };

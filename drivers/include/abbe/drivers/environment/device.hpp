@@ -98,7 +98,8 @@ class EnvironmentDevice final : public Device {
   EnvironmentReceiver receiver_;
   std::unique_ptr<EnvironmentLink> own_link_;  ///< null if the link is shared
   EnvironmentLink& link_;
-  std::uint64_t opening_ = 0;  ///< link_.openings when this device began reading; 0: not begun
+  /// value of link_.openings when this device began reading; 0: not begun
+  std::uint64_t opening_ = 0;
   std::uint64_t answers_ = 0;
   std::uint64_t others_at_fault_ = 0;  ///< answers of the other devices until the latest fault
 

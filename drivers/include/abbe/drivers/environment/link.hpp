@@ -12,8 +12,9 @@ namespace abbe::drivers {
 
 struct EnvironmentLink {
   ModbusLine line;
-  std::uint64_t openings = 0;        ///< a device restarts if it stored another number
-  std::uint64_t answers = 0;         ///< of all devices
+  /// incremented at each opening; a device that has stored another number restarts its reading
+  std::uint64_t openings = 0;
+  std::uint64_t answers = 0;  ///< number of answers of all devices
   protocol::HostTime open_at{};      ///< earliest time to open the line again
   protocol::HostTime quiet_until{};  ///< bytes until then are a late answer and are discarded
 };

@@ -25,7 +25,7 @@ namespace abbe::drivers {
 namespace modbus = protocol::modbus;
 
 struct ModbusTcp {
-  std::string host;  ///< address or name
+  std::string host;  ///< IP address or host name
   std::uint16_t port = modbus::kTcpPort;
 };
 
@@ -50,9 +50,9 @@ class ModbusLine {
   ModbusLine(const ModbusLine&) = delete;
   ModbusLine& operator=(const ModbusLine&) = delete;
 
-  /// Always with the same address. Blocks for at most `wall`; the first call also waits at most 1 s
-  /// for the address of a host name: see HostAddresses. Error Unreachable (refused, no
-  /// route, no such path, serial line in use) or Timeout.
+  /// Opens the connection. `address` must be the same in every call. Blocks for at most `wall`; the
+  /// first call also waits at most 1 s for the address of a host name: see HostAddresses. Error
+  /// Unreachable (refused, no route, no such path, serial line in use) or Timeout.
   [[nodiscard]] Result<void> open(const ModbusAddress& address, std::chrono::nanoseconds wall);
   [[nodiscard]] bool is_open() const noexcept { return context_ != nullptr; }
   void close() noexcept;

@@ -24,7 +24,8 @@
 
 namespace abbe::drivers {
 
-/// Why the answers of the device are rejected; text_of() gives the text with the names of the map.
+/// The reason why the answers of the device are rejected; text_of() makes a text with the names of
+/// the register map.
 struct EnvironmentFailure {
   enum class Kind : std::uint8_t {
     None,
@@ -105,12 +106,12 @@ class EnvironmentReceiver {
   modbus::Transport transport_;
   std::vector<modbus::ReadRequest> proving_reads_;
   std::vector<modbus::ReadRequest> reads_;
-  std::vector<Spot> spots_;  ///< of map_.measured
+  std::vector<Spot> spots_;  ///< one element for each register in map_.measured
 
   bool begun_ = false;
   bool proven_ = false;
   bool first_round_ = true;
-  std::size_t read_ = 0;  ///< the next of proving_reads_ or reads_
+  std::size_t read_ = 0;  ///< index of the next read in proving_reads_ or reads_
   std::optional<modbus::ReadRequest> pending_;
   std::array<std::byte, 2 * modbus::kMaxAduSize> bytes_{};
   std::size_t filled_ = 0;

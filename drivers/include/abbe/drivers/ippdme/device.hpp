@@ -1,7 +1,8 @@
 #pragma once
 /// A measuring machine with an I++ DME server, as a Device: IppReceiver and IppSession over one TCP
-/// connection. Its touches have the same type as those of the counter card: each measured point is
-/// a ProbeTrigger, a failed one a ProbeTrigger without position. States: those of IppState.
+/// connection. Its touches have the same type as those of the counter card: each measured point
+/// gives a ProbeTrigger, each failed point a ProbeTrigger without position. The states of the
+/// device are those of IppState.
 
 #include <array>
 #include <atomic>
@@ -35,7 +36,7 @@ struct IppMachine {
 
 struct IppStored {
   bool done = false;
-  std::string fault;  ///< why the latest attempt failed; empty: none failed, or `done`
+  std::string fault;  ///< text why the latest attempt failed; empty: none failed, or `done` is true
 };
 
 struct IppDeviceOptions {
@@ -45,13 +46,14 @@ struct IppDeviceOptions {
   IppSessionOptions session;  ///< `peer` is made from name, host and port
   IppReceiverOptions receiver;
   /// Called on the device thread at every change of the state: before the first command of a
-  /// motion, when the machine has stopped, when a hold begins or ends. A hold: the machine awaits a
-  /// release by an operator. It must not wait: AbortE is sent by the same thread. Let another
-  /// thread store the value, and pass it in session.held and session.moving after a restart.
+  /// motion, when the machine has stopped, when a hold begins or ends. (A hold means that the
+  /// machine awaits a release by an operator.) The function must not wait, because the same thread
+  /// sends AbortE. Let another thread store the value, and pass it in session.held and
+  /// session.moving after a restart.
   std::function<void(const IppMachine&)> machine_changed;
-  /// Whether the latest value of machine_changed is stored. Called on the device thread; must not
-  /// wait. A motion is sent only after its state is stored; one whose state cannot be stored is not
-  /// sent. Empty: each value counts as stored at once.
+  /// States whether the latest value passed to machine_changed is stored. Called on the device
+  /// thread; must not wait. A motion is sent only after its state is stored; if the state cannot be
+  /// stored, the motion is not sent. Empty: each value counts as stored at once.
   std::function<IppStored()> machine_stored;
   std::size_t touch_capacity = 256;
   std::size_t position_capacity = 256;  ///< 25 s at 10 positions per second
@@ -79,7 +81,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// connection.
   [[nodiscard]] static Result<std::unique_ptr<IppDevice>> create(const IppDeviceOptions& options,
                                                                  const TimeSource& time);
-  /// As finish().
+  /// Calls finish().
   ~IppDevice() override;
 
   /// Stops a motion in progress, waits for the answer to AbortE (at most command_timeout; if the

@@ -78,7 +78,7 @@ struct ProbePoint {
   bool touch = true;
 };
 
-/// Targets that are driven to in this order.
+/// Targets that the machine moves to in this order.
 using IppPath = std::vector<ProbePoint>;
 /// Error BadConfiguration for the first target that I++ DME cannot express: a position or a normal
 /// that is not finite or too large. The text names target, coordinate and value.
@@ -127,17 +127,16 @@ struct IppConnected {};
 struct IppConnectionLost {
   std::string what;
 };
-struct IppStopRequested {};  ///< ends the session
+struct IppStopRequested {};  ///< input: ends the session
 /// Input: stop a motion, discard all points, and await a release whether or not the machine moved.
 struct IppAbortRequested {
-  /// Of the request; returned with the outcome. Requests of several threads may arrive out of
-  /// order:
-  /// the outcome has the highest number.
+  /// Number of the request; returned with the outcome. Requests of several threads may arrive out
+  /// of order; the outcome has the highest number.
   std::uint64_t number = 0;
-  std::string_view reason = "stopped by request";  ///< of the hold; a literal
+  std::string_view reason = "stopped by request";  ///< reason of the hold; a string literal
 };
-struct IppReleaseRequested {};  ///< an operator has inspected the machine
-struct IppMotionStored {};      ///< in Storing: the motion may be sent
+struct IppReleaseRequested {};  ///< input: an operator has inspected the machine
+struct IppMotionStored {};  ///< input in state Storing: the motion may be sent
 /// Input in Storing: the motion must not be sent.
 struct IppMotionNotStored {
   std::string why;
@@ -148,8 +147,9 @@ using IppInput =
                  IppComplete, IppData, IppError, IppProtocolError>;
 
 struct IppNothing {};
-struct IppOpen {};   ///< open a connection; the input IppConnected or IppConnectionLost follows
-struct IppClose {};  ///< close the connection; no IppConnectionLost follows
+/// action: open a connection; the input IppConnected or IppConnectionLost follows
+struct IppOpen {};
+struct IppClose {};  ///< action: close the connection; no IppConnectionLost follows
 struct IppSend {
   std::string line;  ///< with its CR LF
 };
@@ -161,7 +161,7 @@ class IppSession {
   explicit IppSession(IppSessionOptions options);
 
   [[nodiscard]] IppAction on(const IppInput& input, protocol::HostTime now);
-  /// When the next IppTick is due.
+  /// The time at which the next IppTick is due.
   [[nodiscard]] protocol::HostTime deadline() const noexcept { return deadlines_.next(); }
 
   [[nodiscard]] IppState state() const noexcept { return state_; }
@@ -170,22 +170,24 @@ class IppSession {
   [[nodiscard]] bool held() const noexcept { return held_; }
   /// True if IppReleaseRequested has an effect: held, and no motion is still being stopped.
   [[nodiscard]] bool releasable() const noexcept;
-  /// Why the machine is held; empty if it is not. Later faults do not change the reason.
+  /// The reason why the machine is held; empty if it is not. Later faults do not change the reason.
   [[nodiscard]] const std::string& hold_reason() const noexcept { return hold_reason_; }
   /// True if a motion was sent, on this connection or an earlier one, and its end was not reported.
   [[nodiscard]] bool moving() const noexcept { return moving_; }
   /// True if moving(), or if a motion is sent as soon as this is stored.
   [[nodiscard]] bool may_move() const noexcept { return moving_ || state_ == IppState::Storing; }
-  /// True while AbortE is awaited, or a connection or session in which the ending session sends it.
+  /// True while the session waits for the answer to AbortE, or for a connection or session in which
+  /// it will send AbortE.
   [[nodiscard]] bool stopping_motion() const noexcept {
     const bool before_abort = state_ == IppState::Connecting || state_ == IppState::Opening;
     return state_ == IppState::Aborting || (stopped_ && moving_ && before_abort);
   }
-  /// The owner ends without waiting any longer: an outstanding request to stop has failed.
+  /// The owner no longer waits for the end: an outstanding request to stop counts as failed.
   void give_up_stop();
   /// The latest request to stop and its outcome.
   [[nodiscard]] const IppStop& stop() const noexcept { return stop_; }
-  /// Why the machine may be moving although nothing can be done about it now; empty if it cannot.
+  /// Why the machine may be moving although the session cannot stop it now; empty if it cannot be
+  /// moving.
   [[nodiscard]] std::string danger() const;
   /// Number of requested points that are neither finished nor discarded.
   [[nodiscard]] std::size_t points_left() const noexcept {
@@ -203,7 +205,7 @@ class IppSession {
   enum class Purpose { Other, Start, Version, IsHomed, Get, Move, Touch, Clear, Watch, End };
   struct Step {
     IppState state;
-    std::string method;  ///< with its arguments
+    std::string method;  ///< method of the command, with its arguments
     Purpose purpose = Purpose::Other;
     bool moves = false;
     std::optional<ippdme::Tag> event = {};  ///< tag of an event; done when acknowledged
@@ -297,11 +299,11 @@ class IppSession {
   /// Close the connection when the motion has stopped. Set after a malformed, unexpected or missing
   /// response: the further content of the connection is not reliable.
   bool close_then_ = false;
-  bool held_ = false;  ///< until the machine is released
+  bool held_ = false;  ///< true until the machine is released
   std::string hold_reason_;
   std::string last_note_;       ///< latest fault without the peer and the reason of a hold
   std::string stop_reason_;     ///< last_note_ when AbortE was sent
-  std::string asked_reason_;    ///< of a request to stop that found no connection; empty: none
+  std::string asked_reason_;  ///< reason of a request to stop that found no connection; empty: none
   bool session_first_ = false;  ///< start a session before AbortE: the server requires one
   bool may_home_;
   IppStop stop_;

@@ -16,16 +16,16 @@ namespace abbe::drivers {
 struct MarkTraverseOptions {
   DistanceCode code;
   double counts_per_period = 4.0;  ///< negative: the counter counts against the scale
-  /// Least motion back that is a change of direction; a smaller one is noise.
+  /// Smallest motion backwards that counts as a change of direction; a smaller motion is noise.
   double reversal_periods = 0.5;
-  std::size_t most_refusals = 4;  ///< consecutive, reversals not counted
+  std::size_t most_refusals = 4;  ///< consecutive refusals; reversals are not counted
 };
 
 class MarkTraverse {
  public:
   explicit MarkTraverse(const MarkTraverseOptions& options) noexcept : options_(options) {}
 
-  /// Takes the live count. To be called at least about once per signal period of the scale.
+  /// Takes the live count. Call it at least about once per signal period of the scale.
   void on_position(std::int64_t count) noexcept;
   /// Takes the count at a mark that was crossed. Returns a zero, the reason why the marks give
   /// none, or nullopt if more marks are needed.
@@ -46,9 +46,9 @@ class MarkTraverse {
   std::size_t count_ = 0;
   std::size_t refusals_ = 0;
   bool moving_ = false;  ///< a position is known
-  int direction_ = 0;    ///< of travel; 0: unknown
+  int direction_ = 0;  ///< direction of travel; 0: unknown
   double farthest_ = 0.0;
-  bool reversed_ = false;  ///< since the latest mark
+  bool reversed_ = false;  ///< the direction has changed since the latest mark
 };
 
 }  // namespace abbe::drivers

@@ -36,7 +36,7 @@ class MarkWatcher final : public CounterScanSink {
  private:
   SampleRing<MarkCrossing> crossings_;
   bool known_ = false;
-  bool restarted_ = false;  ///< to be reported with the next crossing
+  bool restarted_ = false;  ///< a restart must be reported with the next crossing
   protocol::HostTime last_{};
   std::array<std::int64_t, protocol::kMaxAxes> count_{};
 };

@@ -2,7 +2,7 @@
 /// Detects touches in the scans of a counter card: first edge, confirmation, position at the
 /// contact, re-arming on retraction. It also outputs the scans around every touch (the window). It
 /// is a CounterScanSink; the same scans give the same touches, live and in a replay. A touch is
-/// output when it is confirmed, its window as the scans arrive.
+/// output when it is confirmed; the scans of its window are output as they arrive.
 ///
 /// Real time: on_scan() allocates no memory and does a bounded amount of work. One thread; any
 /// thread may read the counters.
@@ -20,7 +20,7 @@
 
 namespace abbe::drivers {
 
-/// Since construction.
+/// Numbers of events since construction.
 struct TouchCounters {
   Counter touches;
   Counter dismissed;      ///< edges whose signal was not stable
@@ -35,7 +35,7 @@ class TouchDetector final : public CounterScanSink {
 
   void on_scan(const CounterScan& scan) ABBE_RT override;
 
-  /// One reader each.
+  /// Each ring has one reader.
   [[nodiscard]] SampleRing<protocol::ProbeTrigger>& touches() noexcept { return touches_; }
   [[nodiscard]] SampleRing<protocol::TouchScan>& windows() noexcept { return windows_; }
   [[nodiscard]] const TouchCounters& counters() const noexcept { return counters_; }
@@ -72,7 +72,7 @@ class TouchDetector final : public CounterScanSink {
   bool refused_first_ = false;      ///< the same for the first edge of the pending touch
   bool restarted_pending_ = false;  ///< to be reported with the next touch
   std::uint32_t number_ = 0;
-  protocol::ProbeTrigger touch_;  ///< the latest
+  protocol::ProbeTrigger touch_;  ///< the latest touch
   bool window_open_ = false;
   std::uint64_t window_next_ = 0;  ///< number of the next scan to output
   std::int64_t window_end_ = 0;    ///< clock count at the end of the window

@@ -31,17 +31,19 @@ class BurstTimes {
   /// Sets time, u_time and the flags of time of points that arrived at `arrival` and have their
   /// device_time; other flags remain. At most kMostPoints.
   void assign(std::span<protocol::TrackerPoint> points, protocol::HostTime arrival) ABBE_RT;
-  /// The same for a point without a device time that is the mean over [arrival - delay - duration,
-  /// arrival - delay], 0 <= delay <= max_constant_delay. Its time is the middle of this interval;
-  /// delay and duration each contribute a rectangular distribution ([GUM] 4.3.7).
+  /// As assign(), for a point without a device time. The point is the mean over [arrival - delay -
+  /// duration, arrival - delay], where 0 <= delay <= max_constant_delay. Its time is the middle of
+  /// this interval; delay and duration each contribute a rectangular distribution ([GUM] 4.3.7).
   void assign_mean(protocol::TrackerPoint& point, std::chrono::nanoseconds duration,
                    protocol::HostTime arrival) ABBE_RT;
 
-  /// Another clock may follow: the next point is marked Restarted.
+  /// Call it for a new connection: the device may have another clock, so the next point is marked
+  /// Restarted.
   void connection_began() ABBE_RT;
-  /// Data is missing: the next point is marked GapBefore.
+  /// Call it when data is missing: the next point is marked GapBefore.
   void data_lost() ABBE_RT { pending_flags_ |= protocol::SampleFlag::GapBefore; }
-  /// The next point after a gap is marked BeamReturned. Repeated calls count once.
+  /// Call it when the beam is lost: the next point after the gap is marked BeamReturned. Repeated
+  /// calls count once.
   void beam_lost() ABBE_RT;
 
   /// Counts since construction.
@@ -77,7 +79,8 @@ class BurstTimes {
   protocol::HostTime arrival_{};
   bool beam_lost_ = false;
   protocol::SampleFlags pending_flags_ = 0;   ///< for the next point
-  std::optional<protocol::DeviceTime> last_;  ///< of the last point with a time that fits
+  /// device time of the last point with a time that fits
+  std::optional<protocol::DeviceTime> last_;
   std::array<Verdict, kMostPoints> verdicts_{};
 };
 

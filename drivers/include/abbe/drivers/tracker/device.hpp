@@ -31,7 +31,7 @@ struct TrackerDeviceOptions {
   std::uint16_t port = emscon::kPort;
   TrackerSessionOptions session;  ///< `peer` is made from name, host and port
   ClockModelOptions clock;
-  /// What to do if the tracker's clock runs too fast or too slowly, for the fault.
+  /// Advice in the fault text for a tracker whose clock runs too fast or too slowly.
   std::string clock_advice = "have the tracker serviced";
   std::size_t point_capacity = 16384;  ///< 32 s at 500 points per second
   std::size_t environment_capacity = 256;
@@ -63,7 +63,7 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   /// connection.
   [[nodiscard]] static Result<std::unique_ptr<TrackerDevice>> create(
       const TrackerDeviceOptions& options, const TimeSource& time);
-  /// Stops the measurement and restores the settings that abbe changed; takes at most
+  /// Stops the measurement and restores the settings that abbe changed. Takes at most
   /// TrackerSessionOptions::leave_within.
   ~TrackerDevice() override;
 

@@ -19,15 +19,15 @@ inline constexpr double kLongestSearch_m = 200.0;
 struct TrackerOrder {
   enum class What {
     Initialize,      ///< moves the tracker head and loses the beam
-    ListReflectors,  ///< gets the list of the controller
+    ListReflectors,  ///< reads the list of reflectors from the controller
     SetReflector,
     GoHome,         ///< points the beam to the bird bath, the home position of the reflector
     FindReflector,  ///< searches around the current direction of the beam
   };
   What what = What::ListReflectors;
   std::uint64_t number = 0;  ///< identifies the order in its report
-  std::string reflector;     ///< SetReflector: name or id
-  /// FindReflector: approximate distance of the reflector, 0 to kLongestSearch_m.
+  std::string reflector;  ///< for SetReflector: name or id
+  /// For FindReflector: approximate distance of the reflector, 0 to kLongestSearch_m.
   double distance_m = 0.0;
 };
 /// Text for messages: "initialize", "find", ...
@@ -49,7 +49,7 @@ struct TrackerOrderReport {
   std::uint64_t number = 0;
   Outcome outcome = Outcome::Failed;
   std::string text;                          ///< the result in words
-  std::vector<TrackerReflector> reflectors;  ///< ListReflectors
+  std::vector<TrackerReflector> reflectors;  ///< for ListReflectors
   [[nodiscard]] bool done() const noexcept { return outcome == Outcome::Done; }
 };
 

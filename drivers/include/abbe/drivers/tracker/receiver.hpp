@@ -85,8 +85,8 @@ class TrackerReceiver {
   /// Adds the bytes of one read, at most kMaxPacketSize, and their arrival time; a call without
   /// bytes marks a new connection. Call next() until it returns nullopt before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
-  /// To be called where bytes of a recording are missing: searches for the next packet, and marks
-  /// the next sample GapBefore.
+  /// Call it where bytes of a recording are missing. The receiver then searches for the next
+  /// packet, and marks the next sample GapBefore.
   void bytes_lost() ABBE_RT;
 
   /// The next message; nullopt if more bytes are needed.
@@ -122,13 +122,14 @@ class TrackerReceiver {
   TrackerReceiverOptions options_;
   static_assert(emscon::kMaxMultiPoints <= BurstTimes::kMostPoints);
   BurstTimes times_;
-  TrackerCounters counters_;  ///< except those of times_
+  TrackerCounters counters_;  ///< all counters except those of times_
   protocol::HostTime arrival_{};
   bool accepting_ = true;     ///< points have the units that the session set
   bool silenced_ = false;     ///< a protocol error occurred on this connection
-  bool points_came_ = false;  ///< on this connection
+  bool points_came_ = false;  ///< points arrived on this connection
   emscon::Environment environment_{};
-  protocol::HostTime environment_sent_{};  ///< arrival of the packet it was passed on with
+  /// arrival of the packet with which the environment was last returned
+  protocol::HostTime environment_sent_{};
   bool environment_known_ = false;
   std::optional<protocol::EnvironmentSample> weather_due_;  ///< returned after its burst
   emscon::PacketFramer framer_;

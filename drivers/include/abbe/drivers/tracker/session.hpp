@@ -125,8 +125,9 @@ struct TrackerConnectionLost {
 struct TrackerPointsArrived {
   std::size_t count = 0;
 };
-struct TrackerTick {};           ///< time has passed; send one at deadline()
-struct TrackerStopRequested {};  ///< restore the settings, disconnect, do not connect again
+struct TrackerTick {};  ///< input: time has passed; send it at deadline()
+/// input: restore the settings, disconnect, and do not connect again
+struct TrackerStopRequested {};
 using TrackerInput =
     std::variant<TrackerTick, TrackerConnected, TrackerConnectionLost, TrackerPointsArrived,
                  emscon::Answer, emscon::ErrorResponse, emscon::StatusChange, TrackerProtocolError,
@@ -151,15 +152,16 @@ class TrackerSession {
   [[nodiscard]] TrackerAction on(const TrackerInput& input, protocol::HostTime now);
 
   [[nodiscard]] TrackerState state() const noexcept { return state_; }
-  /// When the next TrackerTick is due.
+  /// The time at which the next TrackerTick is due.
   [[nodiscard]] protocol::HostTime deadline() const noexcept { return deadlines_.next(waiting()); }
 
   struct Fault {
-    std::uint64_t count = 0;  ///< since construction
-    std::string text;         ///< the latest: "tracker 10.0.0.7:700: no answer to SetUnits in 3 s"
+    std::uint64_t count = 0;  ///< number of faults since construction
+    /// text of the latest fault: "tracker 10.0.0.7:700: no answer to SetUnits in 3 s"
+    std::string text;
   };
   [[nodiscard]] const Fault& fault() const noexcept { return fault_; }
-  /// Why no points arrive, and what to do; empty while points arrive.
+  /// Why no points arrive, and the remedy; empty while points arrive.
   [[nodiscard]] const std::string& cause() const noexcept { return cause_; }
   /// The report of the latest order; nullopt if there is none, or if it was already taken.
   [[nodiscard]] std::optional<TrackerOrderReport> take_report() {
@@ -261,8 +263,8 @@ class TrackerSession {
   TrackerAction overdue();
   TrackerAction tick_streaming();
   TrackerAction measure_again();
-  /// To be called when the controller reports that the beam is back: plans StartMeasurement after
-  /// resume_within. A point that arrives before then cancels it.
+  /// Call it when the controller reports that the beam is back. It plans StartMeasurement after
+  /// resume_within; a point that arrives before then cancels it.
   void restart_when_beam_is_back();
   TrackerAction start_again();
   TrackerAction query_status();
@@ -291,7 +293,8 @@ class TrackerSession {
   std::string cause_;
   std::vector<TrackerReflector> reflectors_;  ///< list of the controller, as far as received
   std::optional<std::int32_t> reflector_in_use_;
-  std::optional<std::int32_t> reflector_before_;  ///< before the configured one was set
+  /// reflector that was set before the configured one
+  std::optional<std::int32_t> reflector_before_;
   std::optional<TrackerOrder> order_;             ///< accepted, not yet reported
   bool order_begun_ = false;
   std::optional<TrackerOrderReport> report_;

@@ -1,11 +1,11 @@
 #pragma once
-/// The settings that abbe makes in a controller, and their previous values. Other programs use the
-/// same controller, so abbe reads each setting before it sets it, and restores what it changed. Not
-/// real-time.
+/// The settings that abbe changes in a controller, and their previous values. Other programs use
+/// the same controller. Therefore abbe reads each setting before it sets it, and restores the
+/// settings that it changed. Not real-time.
 ///
 /// abbe does not change the values of the transformation and the station orientation. It disables
-/// their use in the system settings, and restores the system settings at the end. The settings of
-/// Nivel and camera are not changed.
+/// their use in the system settings, and restores the system settings at the end. It does not
+/// change the settings of Nivel and camera.
 
 #include <optional>
 #include <vector>
@@ -27,7 +27,7 @@ class TrackerSettings {
   [[nodiscard]] std::vector<emscon::Request> questions() const;
   /// Stores the answer to a query. A setting that the controller does not report is not restored.
   void found(const emscon::Answer& answer);
-  /// Queries all settings again: call when the controller may have lost them. A value that abbe
+  /// Queries all settings again. Call it when the controller may have lost them. A value that abbe
   /// itself set does not replace the stored previous value.
   void ask_again() noexcept;
 

@@ -27,7 +27,7 @@ struct UsbIdentity {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
   std::string serial;              ///< empty: exactly one such device must be connected
-  std::uint8_t configuration = 1;  ///< selected when opened
+  std::uint8_t configuration = 1;  ///< selected when the device is opened
   std::uint8_t bulk_endpoint = 0;  ///< must exist; address including the direction bit
 };
 

@@ -75,7 +75,7 @@ struct Heartbeat {
 [[nodiscard]] CanFrame encode_heartbeat(NodeId node, NodeState state) ABBE_RT;
 [[nodiscard]] std::optional<Heartbeat> decode_heartbeat(const CanFrame& frame) ABBE_RT;
 
-/// The class of an emergency error code [CiA 301] in words: "communication: CAN overrun", "device
+/// The class of an emergency error code [CiA 301] as text: "communication: CAN overrun", "device
 /// specific".
 /// Static storage.
 [[nodiscard]] const char* emergency_text(std::uint16_t code) noexcept;

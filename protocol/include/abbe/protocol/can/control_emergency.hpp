@@ -17,9 +17,9 @@ enum class ControlCause : std::uint8_t {
 };
 [[nodiscard]] const char* to_text(ControlCause cause) noexcept;  ///< static storage
 
-/// Emergency of `node`; without a cause: error reset, the joint has a position.
+/// The emergency that `node` sends for a cause; nullopt: error reset, the joint has a position.
 [[nodiscard]] Emergency control_emergency(NodeId node, std::optional<ControlCause> cause);
-/// nullopt: an emergency of another device, or an error reset.
+/// The cause in an emergency; nullopt: an emergency of another device, or an error reset.
 [[nodiscard]] std::optional<ControlCause> control_cause(const Emergency& emergency);
 
 }  // namespace abbe::protocol::can

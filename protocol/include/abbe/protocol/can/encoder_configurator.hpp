@@ -73,7 +73,8 @@ struct EncoderDescription {
   std::optional<std::uint32_t> step_nm;  ///< linear, as read; the caller must check for 0
   std::optional<std::uint32_t> operating_parameters;  ///< rotary: 6000h
   std::optional<std::uint32_t> units_per_revolution;  ///< rotary
-  std::optional<std::uint32_t> total_range;  ///< rotary: counts after which the position wraps
+  /// rotary: number of counts after which the position wraps to 0
+  std::optional<std::uint32_t> total_range;
   std::optional<std::uint32_t> revolutions;  ///< rotary without scaling: 6502h
   bool fixed_mapping = false;                ///< the mapping is fixed and contains the position
   std::uint8_t position_byte = 0;            ///< offset of the position in the TPDO
@@ -113,7 +114,7 @@ class EncoderConfigurator {
   void start(HostTime now) noexcept;
   void on_frame(const CanFrame& frame, HostTime now) noexcept;
   void on_time(HostTime now) noexcept;
-  /// The next frame to send. To be called until it returns nullopt.
+  /// The next frame to send. Call it until it returns nullopt.
   [[nodiscard]] std::optional<CanFrame> take_frame() noexcept;
 
   [[nodiscard]] State state() const noexcept { return state_; }

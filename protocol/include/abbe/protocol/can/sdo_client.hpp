@@ -41,16 +41,16 @@ class SdoClient {
   /// Takes any frame of the bus; ignores all but the answers to this transfer.
   void on_frame(const CanFrame& frame, HostTime now) noexcept;
   void on_time(HostTime now) noexcept;
-  /// The next frame to send. To be called until it returns nullopt.
+  /// The next frame to send. Call it until it returns nullopt.
   [[nodiscard]] std::optional<CanFrame> take_frame() noexcept;
 
   [[nodiscard]] State state() const noexcept { return state_; }
   [[nodiscard]] ObjectId object() const noexcept { return object_; }
-  /// When on_time() must be called; HostTime::max() if no transfer is in progress.
+  /// The time at which on_time() must be called; HostTime::max() if no transfer is in progress.
   [[nodiscard]] HostTime deadline() const noexcept {
     return state_ == State::Busy ? deadline_ : HostTime::max();
   }
-  /// Why the transfer failed, in state Failed; AbortCode::None in other states.
+  /// The reason why the transfer failed, in state Failed; AbortCode::None in other states.
   [[nodiscard]] AbortCode abort_code() const noexcept { return abort_code_; }
   /// True if the server sent the abort, false if this client did.
   [[nodiscard]] bool aborted_by_server() const noexcept { return aborted_by_server_; }
@@ -89,7 +89,7 @@ class SdoClient {
   HostTime deadline_{};
   unsigned attempts_left_ = 0;
   std::size_t size_ = 0;                    ///< number of valid bytes of `buffer_`
-  std::size_t sent_ = 0;                    ///< of a segmented download
+  std::size_t sent_ = 0;  ///< number of bytes sent of a segmented download
   std::optional<std::uint32_t> announced_;  ///< size the server announced for a segmented upload
   std::array<std::byte, kMaxSdoBytes> buffer_{};
   std::array<CanFrame, 4> outbox_{};  ///< at most abort + new initiate per event

@@ -72,9 +72,9 @@ class DatagramView {
   std::uint16_t left_;
 };
 
-/// Counts lost datagrams by their sequence number, which wraps at 256. A number up to 128 before
-/// the expected one is a late datagram: it is counted as late and does not change the expected
-/// number.
+/// Counts lost datagrams by their sequence number, which wraps at 256. A datagram whose number is
+/// up to 128 before the expected one is late: it is counted as late and does not change the
+/// expected number.
 class SequenceGaps {
  public:
   /// Returns the number of datagrams missing between the last one and this one.

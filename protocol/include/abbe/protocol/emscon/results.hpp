@@ -22,7 +22,7 @@ struct ErrorResponse {
   Status status = Status::Unknown;
 };
 
-/// Type 8.
+/// Packet type 8: the status of the controller has changed.
 struct StatusChange {
   Event event{};
 };

@@ -124,8 +124,9 @@ struct Summary {
 };
 
 [[nodiscard]] tl::expected<Summary, SummaryError> read_summary(Bytes file);
-/// The same from the end of a file. `tail`: the bytes from the offset `begin` to the end of the
-/// file, at least from summary_start on, which read_footer() returns. The views are into `tail`.
+/// Same as the function above, for the end of a file. `tail`: the bytes from the offset `begin` to
+/// the end of the file; it must contain the bytes from summary_start on, which read_footer()
+/// returns. The result contains views into `tail`.
 [[nodiscard]] tl::expected<Summary, SummaryError> read_summary(Bytes tail, std::uint64_t begin);
 /// The footer; for `tail` the last kLeastTail bytes of the file are enough.
 [[nodiscard]] tl::expected<Footer, SummaryError> read_footer(Bytes tail,

@@ -38,7 +38,7 @@ enum class DecodeError : std::uint8_t {
   Unit,           ///< the answer is from another unit
   Function,       ///< another function than requested, or an unsupported one
   Crc,            ///< RTU
-  TrailingBytes,  ///< more than one answer
+  TrailingBytes,  ///< the frame contains more than one answer
 };
 [[nodiscard]] std::string_view name_of(DecodeError error) noexcept;
 

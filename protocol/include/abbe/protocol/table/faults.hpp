@@ -11,8 +11,8 @@ namespace abbe::protocol {
 
 /// Collects lines of the form "file:line:column: key: what is wrong". Shows the first `most_shown`
 /// faults in the order of the file and counts the others. A fault that is added several times is
-/// one fault with a count. If there are more than `kEach` faults of one kind, one line stands for
-/// all of them: the first fault, then "and 411 more like this".
+/// shown as one fault with a count. If there are more than `kEach` faults of one kind, one line
+/// represents all of them: the first fault, then "and 411 more like this".
 class Faults {
  public:
   static constexpr std::size_t kShown = 20;
@@ -28,7 +28,7 @@ class Faults {
   void add_kind(std::string_view kind, std::size_t line, std::size_t column, std::string_view key,
                 std::string_view what);
   [[nodiscard]] bool any() const noexcept { return count_ > 0; }
-  [[nodiscard]] std::size_t count() const noexcept { return count_; }  ///< of the calls of add()
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }  ///< number of calls of add()
   [[nodiscard]] std::string heading() const;                           ///< "t.csv: 3 faults"
   /// The lines for the user: the faults that are shown, and a last line that counts the others.
   [[nodiscard]] std::vector<std::string> lines() const;
@@ -46,7 +46,7 @@ class Faults {
   };
   struct Shown {
     const Fault* fault;
-    std::size_t stands_for;  // number of faults
+    std::size_t stands_for;  // number of faults that the line represents
   };
   [[nodiscard]] static bool is_before(const Fault& a, const Fault& b);
   [[nodiscard]] Kind& kind_named(std::string name);

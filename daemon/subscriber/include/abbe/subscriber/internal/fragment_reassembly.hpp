@@ -1,6 +1,6 @@
 #pragma once
-/// Reassembles messages of authentication from their fragments [DDSI-RTPS 2.5, 8.3.8.3]. They come
-/// before any key is checked, and a message can only be checked as a whole.
+/// Reassembles messages of authentication from their fragments [DDSI-RTPS 2.5, 8.3.8.3]. These
+/// messages arrive before any key is checked, and they can be checked only as a whole.
 ///
 /// Thread-safe: a participant may receive on several channels.
 
@@ -15,24 +15,28 @@
 
 namespace abbe::dds {
 
-/// A DATA_FRAG submessage of a writer of authentication, with lengths that are already checked.
+/// A DATA_FRAG submessage from a writer of authentication messages. Its lengths are already
+/// checked.
 struct Fragment {
   std::array<std::uint8_t, 20> header;  ///< of the RTPS message, with the prefix of the source
   bool little_endian;
-  std::span<const std::uint8_t, 16> ids;  ///< reader, writer, sequence number
-  std::uint32_t first, count, size;       ///< number of the first one, from 1; size of each
+  std::span<const std::uint8_t, 16> ids;  ///< ids of reader and writer, and the sequence number
+  /// number of the first fragment, counted from 1; number of fragments; size of each
+  std::uint32_t first, count, size;
   std::uint32_t sample_size;
   std::span<const std::uint8_t> payload;
 };
 
 class FragmentReassembly {
  public:
-  /// Fits into one DATA submessage. A certificate and its permissions take 2 to 6 kB.
+  /// Longest sample in bytes; it fits into one DATA submessage. A certificate and its permissions
+  /// take 2 to 6 kB.
   static constexpr std::size_t kLongestSample = 60000;
-  /// Samples of which fragments are missing. When one more begins, the oldest is discarded.
+  /// Most incomplete samples. When a further one begins, the oldest is discarded.
   static constexpr std::size_t kMostSamples = 64;
 
-  /// If it completes a sample: an RTPS message with the sample in one DATA submessage.
+  /// Adds the fragment. If it completes a sample, returns an RTPS message with the sample in one
+  /// DATA submessage.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> add(const Fragment& fragment);
 
  private:
@@ -40,8 +44,8 @@ class FragmentReassembly {
     std::array<std::uint8_t, 12> source;
     std::array<std::uint8_t, 16> ids;
     std::uint32_t fragment_size;
-    std::vector<std::uint8_t> message;  ///< with room for the whole sample
-    std::vector<bool> received;         ///< by number of the fragment
+    std::vector<std::uint8_t> message;  ///< has space for the whole sample
+    std::vector<bool> received;  ///< one element per fragment
     std::size_t missing;
   };
   Sample* sample_of(const Fragment& fragment);

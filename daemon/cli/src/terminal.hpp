@@ -32,7 +32,7 @@ class ProgressBar {
   ~ProgressBar() { clear(); }
 
   void show(std::string_view step, double fraction);
-  /// Shows what a task reports; the bar must outlive it.
+  /// Shows the progress that a task reports; the bar must outlive the task.
   [[nodiscard]] Progress progress(Progress::Stopped stopped = {}) {
     return Progress([this](std::string_view step, double share) { show(step, share); },
                     std::move(stopped));

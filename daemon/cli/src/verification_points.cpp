@@ -27,8 +27,8 @@ void print_point(std::size_t number, const json& point) {
              1e6 * point.at("scatter_m").get<double>());
 }
 
-/// Requests the points that are new since the last call from the daemon, prints them and keeps them
-/// in `out`. Returns why the daemon collects no more points; empty if it still collects.
+/// Requests from the daemon the points that are new since the last call, prints them and stores
+/// them in `out`. Returns why the daemon collects no more points; empty if it still collects.
 Result<std::string> poll_points(const std::filesystem::path& socket, const json& number,
                                 const char* step, VerificationFile& out, const KeepPoints& keep) {
   const auto answer = ask_daemon(
@@ -43,8 +43,8 @@ Result<std::string> poll_points(const std::filesystem::path& socket, const json&
   return answer->value("stopped", std::string{});
 }
 
-/// The result after an error: the points collected so far, with the error as `cut_short`; if there
-/// are no points, the error.
+/// The result after an error: the points collected so far, with the error as `cut_short`. If there
+/// are no points, the result is the error.
 Result<LivePoints> points_so_far(VerificationFile& points, const std::string& machine,
                                  const Error& error) {
   if (points.points.empty()) return tl::make_unexpected(error);

@@ -41,7 +41,7 @@ struct VerifyCommand : VerifyArguments {
   bool json = false;
 };
 
-/// --live: points of the running daemon.
+/// Sets up the option --live: the points are measured with the running daemon.
 void measure_live(VerifyCommand& arguments) {
   if (!arguments.live_points) return;
   arguments.live = [&arguments](const KeepPoints& keep,
@@ -80,7 +80,7 @@ json ratio_json(const verify::RatioStatistics& s) {
           {"share_above_1", static_cast<double>(s.above_1) / static_cast<double>(s.count)}};
 }
 
-/// What only one model has.
+/// The JSON members that exist only for a single model.
 json one_json(const Verification& v) {
   const auto& c = v.comparison();
   json object = model_json(v.models.front());
@@ -195,7 +195,7 @@ json verification_json(const Verification& v) {
   return object;
 }
 
-/// report.html and grid.csv, and the report as PDF, of one model.
+/// Writes report.html, grid.csv and the report as PDF, for a single model.
 Result<void> write_outputs(const VerifyCommand& arguments, const Verification& v,
                            const Progress& progress) {
   if (v.models.size() > 1) return {};
@@ -217,7 +217,7 @@ void print(const Verification& v, const VerifyCommand& arguments) {
                (std::filesystem::path(arguments.out) / "report.html").string());
 }
 
-/// Before points are measured.
+/// Checks, before points are measured, that the PDF can be written.
 Result<void> check_pdf(const VerifyCommand& arguments) {
   if (arguments.pdf.empty()) return {};
   if (arguments.models.size() > 1) return fail(ErrorCode::Usage, "--pdf is for one model");
@@ -249,7 +249,7 @@ int run(const VerifyCommand& arguments) {
   return number(failed ? ExitCode::Refused : ExitCode::Done);
 }
 
-/// Of points that another program exported.
+/// Adds the options for points that another program exported.
 void add_export_options(CLI::App& command, VerifyCommand& arguments, CLI::Option* points) {
   command
       .add_option("--readings", arguments.readings,

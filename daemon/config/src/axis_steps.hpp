@@ -21,7 +21,7 @@ void check_step(ClassifiedSection& section, double step, bool linear);
 /// in the file that has one element with a step per axis.
 void doubt_steps(Section& root, const char* table, const char* list, const MachineConfig& machine);
 
-/// "10 nm".
+/// The step as text: "10 nm".
 [[nodiscard]] std::string step_text(double step, bool linear);
 
 }  // namespace abbe::daemon

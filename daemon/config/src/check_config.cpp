@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// ---- What the configuration refers to on this computer ----
+// ---- Files and folders of this computer that the configuration names ----
 
 /// `folder` if it exists, else the nearest folder above it that exists. Empty if this cannot be
 /// determined.
@@ -42,8 +42,8 @@ void check_folder(Section section, std::string_view key, const fs::path& folder)
                                  folder.string(), part.string()));
 }
 
-/// False also if the path cannot be examined, for example because a folder above it may not be
-/// searched by this user: then the file may exist for abbed.
+/// True if the path does not exist. False also if the path cannot be examined, for example because
+/// this user may not search a folder above it; abbed may then be able to see the file.
 bool is_missing(const fs::path& path, bool folder) {
   std::error_code error;
   const auto status = fs::status(path, error);
@@ -52,7 +52,7 @@ bool is_missing(const fs::path& path, bool folder) {
 }
 
 void check_dds_files(Section dds, const DdsConfig& config) {
-  if (config.supervise == Supervise::Off) return;  // abbed does not read them
+  if (config.supervise == Supervise::Off) return;  // abbed does not read these files then
   if (!config.profile.empty() && is_missing(config.profile, false))
     dds.fault("profile", fmt::format("there is no file {}. Without this key the built-in profile "
                                      "is used",
@@ -71,15 +71,17 @@ void check_paths(Section& root, const Config& config) {
   check_dds_files(root.child("dds"), config.dds);
 }
 
-/// abbed does not read these files: a missing one is no reason not to start.
+/// Adds a fault for each missing file of [notify]. abbed does not read these files: it also starts
+/// without them.
 void check_files_of_notify(Section notify, const fs::path& base) {
   check_notify_files(notify, read_notify(notify, base));
 }
 
-// ---- The improbable ----
+// ---- Improbable values ----
 
 constexpr double kLongTravel_m = 50.0;
-constexpr double kManyTurns_rad = 10 * 2.0 * std::numbers::pi;  // 62.8: more is in degrees
+// 62.8 rad; a larger value was probably entered in degrees
+constexpr double kManyTurns_rad = 10 * 2.0 * std::numbers::pi;
 constexpr double kLongTarget_m = 2.0;
 
 void doubt_axis(Section axis, const AxisConfig& config) {
@@ -130,8 +132,8 @@ void doubt_cpus(Section daemon, const DaemonConfig& config, int cpus) {
       daemon.fault(key, fmt::format("CPU {}: this computer has the CPUs 0 to {}", *cpu, cpus - 1));
 }
 
-/// Warns about paths with "~" or "$HOME": no shell expands them, and a folder of that name would be
-/// created.
+/// Warns about paths with "~" or "$HOME". No shell expands them, and a folder with that literal
+/// name would be created.
 void doubt_paths(Section& root, const Config& config) {
   const auto doubt = [&](const char* table, const char* key, const fs::path& path) {
     const bool shell = std::ranges::any_of(path, [](const fs::path& part) {
@@ -155,15 +157,15 @@ void doubt_devices(Section& root, const Config& config) {
     root.child("daemon").fault("simulated", "the devices are those of abbe-sim, not of a machine");
 }
 
-// ---- The example ----
+// ---- Values left from the example file ----
 
-/// Values of the examples abbed.toml and first_abbed.toml that no other machine has all of.
+/// Values of the examples abbed.toml and first_abbed.toml. No other machine has all of them.
 constexpr std::string_view kExampleName = "mill 7", kExampleHost = "192.168.0.1";
 constexpr std::array<std::pair<double, double>, 3> kExampleTravel_m{
     {{-0.3, 0.3}, {-0.25, 0.25}, {-0.4, 0.0}}};
 constexpr std::array kExampleTarget_m{0.02, -0.015, -0.12};
 
-/// Equal but for the conversion from mm.
+/// True if both lengths are equal except for rounding of the conversion from mm.
 bool same_length(double a_m, double b_m) {
   return std::abs(a_m - b_m) < 1e-9;
 }
@@ -192,13 +194,13 @@ std::vector<std::string> left_of_the_example(const toml::table& table,
     if (section != nullptr && (*section)["host"].value_or(std::string_view{}) == kExampleHost)
       left.push_back(fmt::format("{}.host \"{}\"", name.str(), kExampleHost));
   }
-  // A single one may be true: some machines have this travel, and trackers leave the factory with
-  // this address.
+  // A single equal value may be correct: some machines have this travel, and trackers leave the
+  // factory with this address.
   constexpr std::size_t kFewest = 2;
   return left.size() >= kFewest ? left : std::vector<std::string>{};
 }
 
-/// "file:line:column: key: what" for everything that is possible but improbable.
+/// A text "file:line:column: key: what" for every value that is possible but improbable.
 std::vector<std::string> warnings_of(const toml::table& table, const Config& config, int cpus,
                                      const std::string& file) {
   Faults warnings(file, kMostConfigFaults);

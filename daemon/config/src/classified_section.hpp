@@ -1,7 +1,8 @@
 #pragma once
-/// Reads one table of the configuration whose keys state whether they give a reading its meaning.
-/// The same call sets the member from which the options of a driver are made, and adds the value in
-/// use to Config::meaning: a key that is not classified does not compile.
+/// Reads one table of the configuration. Each call states a key with its role, that is, whether the
+/// meaning of a reading depends on the key. The same call sets the member from which the options of
+/// a driver are made, and adds the value in use to Config::meaning. A key without a role does not
+/// compile.
 ///
 ///   reading      the meaning of an axis reading depends on it; in machine_hash()
 ///   measurement  what a tracker or a probe delivers depends on it
@@ -11,8 +12,9 @@
 ///                uncertainties, limits
 ///
 /// An address (host, port, interface, serial number) is where a device is found, not what it
-/// measures: a replaced gateway or a renumbered bus must not end a model. That another machine's
-/// device answers there is a question of the machine's identity, not of its configuration.
+/// measures: a replaced gateway or a renumbered bus must not end a model. Whether the device at the
+/// address belongs to another machine is checked by the identity of the machine, not by its
+/// configuration.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -33,11 +35,12 @@ namespace abbe::daemon {
 
 enum class Role { Reading, Measurement, Stated, Operation };
 
-/// A key with its role. There is no conversion from a text.
+/// A key with its role. A text is not converted to a Key implicitly.
 struct Key {
   std::string_view name;
   Role role;
-  /// The value is in the meaning only if the file has the key: there is no default.
+  /// The value is added to the meaning only if the file has the key, because the key has no
+  /// default.
   bool only_if_given = false;
 };
 [[nodiscard]] constexpr Key reading(std::string_view name) {
@@ -59,7 +62,7 @@ struct Key {
 
 class ClassifiedSection {
  public:
-  /// `path`: of the entries in `meaning`; empty for the whole file.
+  /// `path`: path of this table in the entries of `meaning`; empty for the whole file.
   ClassifiedSection(Section section, std::string path, Meaning& meaning)
       : section_(std::move(section)), path_(std::move(path)), meaning_(&meaning) {}
 
@@ -76,7 +79,7 @@ class ClassifiedSection {
   [[nodiscard]] std::vector<ClassifiedSection> children(std::string_view key,
                                                         std::string_view label);
 
-  // As in Section.
+  // These functions are as in Section.
   bool get(Key key, double& out, Unit unit, Bounds bounds, Need need = Need::Optional) {
     const bool given = section_.get(key.name, out, unit, bounds, need);
     return add(key, given, number_text(out * unit.per_si));
@@ -116,7 +119,8 @@ class ClassifiedSection {
     const bool given = section_.get_integer(key.name, out, min, max, need);
     return add(key, given, fmt::format("{}", out));
   }
-  /// `words`: a value has the first text that has it.
+  /// `words`: texts and their values. If several texts have the same value, the first of them is
+  /// used in the meaning.
   template <class Enum>
   bool get_word(Key key, Enum& out, std::vector<std::pair<std::string_view, Enum>> words,
                 Need need = Need::Optional) {
@@ -127,7 +131,7 @@ class ClassifiedSection {
   /// The value of a key that may have several types; null if absent.
   [[nodiscard]] const toml::node* node(Key key) const { return section_.node(key.name); }
 
-  /// Adds what `stated` keys mean together, as entry `name` of this table.
+  /// Adds the common meaning of keys with role `stated`, as entry `name` of this table.
   void state(Role role, std::string_view name, std::string value);
 
   void fault(std::string_view key, std::string_view what) { section_.fault(key, what); }
@@ -136,7 +140,7 @@ class ClassifiedSection {
 
  private:
   [[nodiscard]] std::string below(std::string_view key) const;
-  /// Returns `given`.
+  /// Adds the value to the meaning according to the role of the key. Returns `given`.
   bool add(Key key, bool given, std::string value);
 
   Section section_;

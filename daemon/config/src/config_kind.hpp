@@ -19,24 +19,25 @@ namespace abbe::daemon {
 
 /// How a device reads the axes.
 struct AxisReadings {
-  std::string_view key;           ///< of its table
-  std::vector<std::string> axes;  ///< in the order of a sample; empty: the first of the machine
-  bool compensated = false;       ///< the control already corrects them
+  std::string_view key;  ///< key of the device's table
+  /// in the order of a sample; empty: the first axes of the machine
+  std::vector<std::string> axes;
+  bool compensated = false;  ///< the control already corrects them
 };
 
 /// One kind of device in the configuration. Each function that takes a Config returns an empty
 /// result if no device of the kind is configured. A null pointer means that the kind does not have
 /// the capability of this member.
 struct ConfigKind {
-  std::string_view key;         ///< of the table
+  std::string_view key;         ///< key of the kind's table
   bool several = false;         ///< an array of tables: [[KEY]]
   std::string_view needs = {};  ///< without this key a table configures no device
 
   /// Reads and checks the table of this kind, adds the device to `out` and its name to `names`. The
   /// kinds that precede this one in DeviceConfigs have been read already.
   void (*read)(ClassifiedSection& root, Config& out, StreamNames& names);
-  /// Adds with ClassifiedSection::state() what keys of the kind mean together with other tables.
-  /// All tables have been read.
+  /// Adds, with ClassifiedSection::state(), the meaning that keys of the kind have together with
+  /// other tables. Called after all tables were read.
   void (*state)(ClassifiedSection& root, const Config& config) = nullptr;
   /// Reports each value that is possible but improbable with Section::fault(). check_config()
   /// prints these faults as warnings.
@@ -46,7 +47,7 @@ struct ConfigKind {
   /// The text of this kind in former_machine_hash(). A new kind has none.
   std::string (*former_text)(const Config& config) = nullptr;
 
-  // Capabilities; see capabilities.hpp.
+  // Capabilities of the kind; see capabilities.hpp.
   std::optional<MotionSource> (*motion)(const Config& config) = nullptr;
   std::optional<AxisReadings> (*axes)(const Config& config) = nullptr;
   /// True: the positions of the device are the axis readings only if no other kind of device reads
@@ -66,7 +67,7 @@ struct ConfigKind {
 /// As tables_with(), each table followed by the key that it requires: "[a] key or [b]".
 [[nodiscard]] std::string needed_for(Capability capability);
 
-/// Of all devices that read the axes.
+/// The axis readings of all devices that read the axes.
 [[nodiscard]] std::vector<AxisReadings> axis_readings(const Config& config);
 /// True if a device that always reads the axes (a kind without `axes_if_no_other`) is configured.
 [[nodiscard]] bool axes_have_own_device(const Config& config);

@@ -19,7 +19,7 @@ std::string table_of(const ConfigKind& kind) {
   return fmt::format(fmt::runtime(kind.several ? "[[{}]]" : "[{}]"), kind.key);
 }
 
-/// "[a], [b] CONJUNCTION [c]".
+/// The tables as text: "[a], [b] CONJUNCTION [c]".
 std::string joined(const std::vector<std::string>& tables, std::string_view conjunction) {
   std::string text;
   for (std::size_t i = 0; i < tables.size(); ++i) {

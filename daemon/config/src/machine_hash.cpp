@@ -11,10 +11,10 @@ namespace {
 
 struct FormerKeys {
   std::string_view table;
-  std::vector<std::string_view> keys;  ///< beginnings; empty: all
+  std::vector<std::string_view> keys;  ///< beginnings of the keys; empty: all keys
 };
 
-/// The keys of former_machine_hash(). It does not change any more.
+/// The keys that former_machine_hash() covers. This list must not change any more.
 const std::vector<FormerKeys> kFormerKeys{
     {"machine", {}},
     {"axes", {}},

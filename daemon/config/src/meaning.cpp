@@ -16,13 +16,13 @@ std::string_view table_in(std::string_view key) {
   return key.substr(0, key.find('.'));
 }
 
-/// The key without its last part: table and element.
+/// The table and element of a key: the key without its last part.
 std::string_view place_of(std::string_view key) {
   const auto dot = key.rfind('.');
   return dot == std::string_view::npos ? std::string_view{} : key.substr(0, dot);
 }
 
-/// "[TABLE] X step_nm" of "TABLE.X.step_nm".
+/// The text for a key: "[TABLE] X step_nm" for "TABLE.X.step_nm".
 std::string key_text(std::string_view key) {
   const auto table = table_in(key);
   std::string rest{key.substr(std::min(key.size(), table.size() + 1))};
@@ -44,7 +44,7 @@ std::set<std::string_view> places_in(const MeaningEntries& entries) {
   return places;
 }
 
-/// The outermost table or element of `key` that `places` lacks; empty: it has all of them.
+/// The outermost table or element of `key` that is not in `places`; empty: all of them are.
 std::string_view missing_place(std::string_view key, const std::set<std::string_view>& places) {
   std::string_view missing;
   for (auto place = place_of(key); !place.empty(); place = place_of(place))
@@ -78,7 +78,7 @@ void take_entries(MeaningEntries& entries, const MeaningEntries& other,
 }
 
 std::string hash_of(const MeaningEntries& entries) {
-  // Each text is preceded by its length, so that different lists have different streams.
+  // Each text is preceded by its length, so that different lists give different byte streams.
   std::string text = "abbe/meaning/2";
   for (const auto& [key, value] : entries)
     text += fmt::format("|{} {} {} {}", key.size(), key, value.size(), value);
@@ -86,7 +86,7 @@ std::string hash_of(const MeaningEntries& entries) {
 }
 
 std::string number_text(double value) {
-  return fmt::format("{:.12g}", value + 0.0);  // minus zero is zero
+  return fmt::format("{:.12g}", value + 0.0);  // the sum turns minus zero into zero
 }
 
 std::string numbers_text(const std::vector<double>& values, double per_si) {

@@ -38,7 +38,7 @@ bool is_host(std::string_view host) {
   return !host.empty() && std::ranges::all_of(host, is_host_character);
 }
 
-/// Where the port begins, with its colon; npos: there is none.
+/// The index of the colon before the port; npos: there is no port.
 std::size_t colon_of_port(std::string_view authority) {
   const auto colon = authority.rfind(':');
   const auto bracket = authority.rfind(']');
@@ -63,7 +63,7 @@ std::optional<NotifyUrl> notify_url(std::string_view url) {
                         .host = authority.substr(0, std::min(colon, authority.size())),
                         .path = rest.substr(path_begin)};
 
-  if (authority.find('@') != authority.npos) return parts;  // the caller refuses it
+  if (authority.find('@') != authority.npos) return parts;  // the caller refuses such a text
   if (!is_host(parts.host)) return std::nullopt;
   if (colon != authority.npos && !is_port(authority.substr(colon + 1))) return std::nullopt;
   return parts;

@@ -38,8 +38,9 @@ bool has_number_over_255(std::string_view host) {
   return false;
 }
 
-/// Why no resolver can accept `host`; empty if it may be an address or a name. What only a resolver
-/// can decide is not checked: leading zeros in a number, names in /etc/hosts, mDNS.
+/// The reason why no resolver can accept `host`; empty if it may be an address or a name.
+/// Properties that only a resolver can check are not checked: leading zeros in a number, names in
+/// /etc/hosts, mDNS.
 std::string fault_of_host(const std::string& host) {
   const auto digit_or_dot = [](char c) { return is_digit(c) || c == '.'; };
   const auto not_printable = [](char c) { return c == ' ' || c == '\x7f' || (c >= 0 && c < ' '); };

@@ -1,6 +1,6 @@
 #pragma once
-/// Checks that values are those of a real machine. A value beyond these limits is a mistake in the
-/// unit or a typing error, and is a fault in a configuration that a person wrote. A recorded
+/// Checks that values are plausible for a real machine. A value beyond these limits is probably in
+/// a wrong unit or mistyped, and is a fault in a configuration that a person wrote. A recorded
 /// configuration is not checked (Section::implausible()).
 
 #include <string_view>

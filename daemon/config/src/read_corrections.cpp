@@ -51,7 +51,7 @@ void read_thermal(ClassifiedSection& root, Config& out) {
 void read_air(ClassifiedSection& root, Config& out) {
   ClassifiedSection air = root.child("air");
   AirConfig& config = out.air;
-  // Without assumed_index the index is only shown.
+  // If assumed_index is absent, the refractive index is only shown.
   const Role index = air.has("assumed_index") ? Role::Measurement : Role::Operation;
   air.get_word<AirEquation>(Key{"equation", index}, config.equation,
                             {{"ciddor", AirEquation::Ciddor},

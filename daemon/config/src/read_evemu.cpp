@@ -30,7 +30,8 @@ void read_positions(Section& section, std::vector<int>& out) {
   for (const double position : given) out.push_back(static_cast<int>(position));
 }
 
-/// The sensor `name` of key `key`; 0 with a fault if no device measures it.
+/// The channel of the sensor `name`, which the key `key` states; 0 with a fault if no device
+/// measures it.
 std::uint8_t sensor_named(Section& section, std::string_view key, const std::string& name,
                           const std::vector<std::string>& temperatures) {
   const auto found = std::ranges::find(temperatures, name);

@@ -17,7 +17,8 @@ namespace abbe::daemon {
 namespace {
 
 constexpr double kDefaultNodeSpacing_m = 0.05;  // the spacing of [Sanders 2023]
-constexpr double kNodeTolerance_m = 1e-9;       // largest difference of end node and end of travel
+// largest difference between the end node and the end of travel
+constexpr double kNodeTolerance_m = 1e-9;
 
 void read_axis(ClassifiedSection axis, const std::string& name, std::vector<AxisConfig>& out) {
   AxisConfig config;
@@ -171,7 +172,9 @@ void read_machine(ClassifiedSection& root, MachineConfig& out) {
   read_axes(root.child("axes", Need::Required), out);
 
   ClassifiedSection target = root.child("target");
-  std::vector<double> offset_m(3, 0.0);  // written or not: the same machine
+  // all three elements are set, so that a missing offset and a stated offset of 0 give the same
+  // machine
+  std::vector<double> offset_m(3, 0.0);
   if (target.get(reading("offset_mm"), offset_m, kMilli)) {
     out.target_given = offset_m.size() == 3;
     if (out.target_given)

@@ -38,7 +38,7 @@ void read_events(Section& section, std::vector<NotifyKind>& out) {
   }
 }
 
-/// RFC 9110, 5.6.2: what the name of a header consists of.
+/// True if `name` can be the name of an HTTP header: RFC 9110, 5.6.2.
 bool is_header_name(const std::string& name) {
   static constexpr std::string_view kOther = "!#$%&'*+-.^_`|~";
   return !name.empty() && std::ranges::all_of(name, [](char c) {
@@ -47,7 +47,7 @@ bool is_header_name(const std::string& name) {
   });
 }
 
-/// What libcurl writes itself. A second one would be ambiguous.
+/// True for a header that libcurl writes itself. A second header of this name would be ambiguous.
 bool is_written_anyway(std::string name) {
   std::ranges::transform(name, name.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -78,7 +78,8 @@ NotifyWebhook read_webhook(Section& section, const std::filesystem::path& base) 
   return out;
 }
 
-/// NAME@HOST in printable ASCII, so that it can end neither a command of SMTP nor a header.
+/// True for NAME@HOST in printable ASCII. Such an address can end neither an SMTP command nor a
+/// header.
 bool is_mail_address(const std::string& address) {
   static constexpr std::string_view kForbidden = "<>()[]\\,;:\"";
   const auto at = address.find('@');
@@ -119,8 +120,8 @@ NotifyMail read_mail(Section section, const std::filesystem::path& base) {
   return out;
 }
 
-/// Adds a fault if a file is missing or other users may read it. Not for a file in a folder that
-/// this user may not search: then abbe-notify may be allowed to.
+/// Adds a fault if a file is missing or if other users may read it. A file in a folder that this
+/// user may not search is not checked, because abbe-notify may be able to read it.
 void check_secret(Section& section, std::string_view key, const std::filesystem::path& file) {
   std::error_code error;
   (void)std::filesystem::status(file, error);

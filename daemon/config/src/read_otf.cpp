@@ -10,7 +10,7 @@ namespace {
 
 enum class SmoothnessWord { None };
 
-/// smoothness = "none", or smoothness_um = [X, Y, Z].
+/// Reads smoothness = "none", or smoothness_um = [X, Y, Z].
 void read_smoothness(Section& section, std::optional<std::array<double, 3>>& out_m) {
   SmoothnessWord word = SmoothnessWord::None;
   std::vector<double> bend_m;

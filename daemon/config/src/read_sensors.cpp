@@ -80,11 +80,11 @@ SensorLimitConfig read_limit(Section& section, const Config& config) {
   return limit;
 }
 
-/// A refused reading is bridged by the last good value only if that is held until the next reading,
-/// which may come somewhat later than the period.
+/// While a reading is refused, the last good value is used, but only for the time hold_s. This time
+/// must reach to the next reading, which may come somewhat later than one period.
 constexpr double kHoldPerPeriod = 1.5;
 
-/// Without hold_s: at least the default, and long enough for every device.
+/// Reads hold_s. Its default is the general default, or longer if a device has a longer period.
 void read_hold(Section& sensors, Config& out) {
   const auto seconds = [](std::chrono::nanoseconds t) {
     return std::chrono::duration<double>(t).count();
@@ -119,7 +119,7 @@ void read_sensors(ClassifiedSection& root, Config& out) {
   read_hold(sensors, out);
   sensors.get("forget_s", config.forget, kPlain, {1.0, 86'400.0});
   sensors.get("start_spread_K", config.start_spread_K, kPlain, kPositive);
-  // The air of a hall changes by some K per hour: a slower correction would never follow it.
+  // The air of a hall changes by several K per hour; a slower correction could never follow it.
   sensors.get("correction_K_per_min", config.correction_K_per_s, {kSecondsPerMinute},
               {0.1, std::numeric_limits<double>::infinity()});
 

@@ -12,7 +12,7 @@
 
 namespace abbe::daemon {
 
-/// All tables. `base`: folder of the file, for relative paths.
+/// Reads all tables. `base`: folder of the file, for relative paths.
 [[nodiscard]] Config read_all(const Section& file, const std::filesystem::path& base);
 
 void read_machine(ClassifiedSection& root, MachineConfig& out);

@@ -13,7 +13,7 @@ namespace abbe::daemon {
 
 inline constexpr auto kLastChannel = static_cast<std::int64_t>(drivers::quad08::kChannels) - 1;
 
-/// Transport and address.
+/// Reads transport and address.
 void read_card_address(ClassifiedSection& table, UsbCardConfig& out);
 void read_card_clock(ClassifiedSection& table, drivers::CounterCardWiring& out);
 void read_debounce(ClassifiedSection& table, Key key, drivers::quad08::Debounce& out);

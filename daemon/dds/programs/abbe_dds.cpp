@@ -93,8 +93,8 @@ void log_source_change(const DdsBridge& bridge, bool& alive) {
 }
 
 /// The configuration as abbe-dds.service passes it on (LoadCredential=), because the user of
-/// abbe-dds may not read it; else the file itself. Its paths are relative to the folder of `file`
-/// either way.
+/// abbe-dds may not read it; else the file itself. In both cases, paths in it are relative to the
+/// folder of `file`.
 abbe::daemon::Result<abbe::daemon::ParticipantConfig> configuration_of(const std::string& file) {
   const char* const credentials = std::getenv("CREDENTIALS_DIRECTORY");
   const auto passed_on =
@@ -108,7 +108,7 @@ abbe::daemon::Result<abbe::daemon::ParticipantConfig> configuration_of(const std
 }
 
 /// Reads the options from abbed.toml when abbe-dds runs as a systemd service. Refused if [dds]
-/// supervise names another way: abbed then starts an abbe-dds of its own, or none.
+/// supervise does not name systemd: abbed then starts its own abbe-dds, or none.
 abbe::daemon::Result<void> take_from_config(Options& options) {
   auto config = configuration_of(options.config);
   ABBE_TRY(config);

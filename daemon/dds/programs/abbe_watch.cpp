@@ -57,8 +57,9 @@ std::string footer() {
               {ExitCode::Internal}});
 }
 
-/// In the order in which the readers are read. Identity and ModelState are first, because
-/// Readers::take() reads topic by topic: every other sample is then judged by the latest of them.
+/// The topics, in the order in which their readers are read. Identity and ModelState are first:
+/// Readers::take() reads topic by topic, so every other sample is judged by the latest of these
+/// two.
 constexpr std::array kTopics{Topic::Identity,     Topic::ModelState,      Topic::ErrorModel,
                              Topic::ErrorGrid,    Topic::Snapshot,        Topic::Health,
                              Topic::Compensation, Topic::CalibrationEvent};
@@ -155,9 +156,9 @@ void report_silence(const Options& options) {
              kReportedSilence.count(), options.participant.domain, topics);
 }
 
-/// The folder that contains the folder `daemon_keys`; a subscriber uses the keys in subscriber-1 of
-/// the former, because the keys in `daemon_keys` allow publishing and only abbed may read them.
-/// `abbe dds keys` makes both.
+/// The folder that contains the folder `daemon_keys`. A subscriber uses the keys in its subfolder
+/// subscriber-1: the keys in `daemon_keys` allow publishing, and only abbed may read them. `abbe
+/// dds keys` makes both subfolders.
 std::filesystem::path subscriber_keys(const std::filesystem::path& daemon_keys) {
   if (daemon_keys.empty()) return {};
   const auto folder = daemon_keys.lexically_normal();

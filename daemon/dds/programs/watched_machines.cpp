@@ -20,10 +20,11 @@ namespace {
 
 using daemon::Topic;
 
-/// A subscriber of all machines keeps no more; a stranger may make up names.
+/// Most machines that a subscriber of all machines keeps, because other participants may publish
+/// any number of names.
 constexpr std::size_t kMostMachines = 256;
-/// Of all publishers together, for the same reason: grid nodes of 0.1 kB, samples not shown yet,
-/// and streams whose state is known.
+/// Limits for all publishers together, because other participants may publish any amount: grid
+/// nodes of 0.1 kB, bytes of samples not shown yet, and streams whose state is kept.
 constexpr std::size_t kMostNodes = 1'000'000, kMostBytesNotShown = 64'000'000, kMostStreams = 4096;
 
 /// A publisher is regarded as not alive if its last ModelState is older than this. Every publisher
@@ -45,7 +46,8 @@ std::string millimetres(const std::vector<double>& position_m, unsigned missing_
   return text + " mm";
 }
 
-/// Texts may come from any participant and need not be valid UTF-8.
+/// Prints the object as one line. Texts in it may come from any participant and need not be valid
+/// UTF-8.
 void print_object(const nlohmann::ordered_json& object) {
   std::printf("%s\n", daemon::json_text(object).c_str());
   std::fflush(stdout);
@@ -108,7 +110,8 @@ PublisherPin::Verdict WatchedMachines::judge(const Arrival& arrival, PublisherPi
 }
 
 void WatchedMachines::keep_for_later(const Arrival& arrival, Publisher& publisher) {
-  constexpr std::size_t kMost = 256;  // slices and streams of a machine, with a margin
+  // limit for slices and for streams of a machine, with a margin
+  constexpr std::size_t kMost = 256;
   const auto& traits = daemon::traits(arrival.topic);
   const auto key = daemon::payload_key(arrival.topic, arrival.payload);
   if (!options_.json || traits.kind != daemon::TopicTraits::Kind::Durable || !key) return;
@@ -234,7 +237,7 @@ void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher, bool pi
     case Topic::Identity:
     case Topic::Health:
     case Topic::CalibrationEvent:
-      return;  // shown when it arrives, not kept
+      return;  // the sample was shown when it arrived, and is not kept
   }
 }
 

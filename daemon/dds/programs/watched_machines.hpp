@@ -20,7 +20,7 @@ namespace abbe::dds {
 
 struct WatchOptions {
   std::string machine;      ///< empty: all machines
-  std::string machine_id;   ///< of this machine; empty: the first one is pinned
+  std::string machine_id;   ///< identity of this machine; empty: the first identity is pinned
   bool json = false;        ///< one line with a JSON object per sample, instead of text
   bool keep_grids = false;  ///< for applicable()
 };
@@ -36,14 +36,15 @@ class WatchedMachines {
   [[nodiscard]] bool received() const { return received_; }
   void take(const Arrival& arrival);
   /// Discards the ModelState of each publisher that is not alive, and shows the change. A publisher
-  /// that becomes alive again repeats its ModelState within a second. Withdraws the decision to
-  /// apply the last vector when it is no longer true, also when nothing arrives any more.
+  /// that becomes alive again repeats its ModelState within a second. Also withdraws the decision
+  /// to apply the last vector when the vector may no longer be applied, even if no further sample
+  /// arrives.
   void notice_losses();
-  /// When the next of these vectors becomes older than its validity, at most `at_most` from now.
+  /// Time until the next of the applied vectors becomes older than its validity, at most `at_most`.
   [[nodiscard]] std::chrono::milliseconds until_next_loss(std::chrono::milliseconds at_most) const;
   /// The first received model that is complete and may be applied; nullptr if there is none.
   [[nodiscard]] const ReceivedModel* applicable() const;
-  /// Why applicable() is nullptr, for each machine.
+  /// The reason why applicable() is nullptr, for each machine.
   [[nodiscard]] std::string why_not() const;
 
  private:
@@ -59,13 +60,13 @@ class WatchedMachines {
     std::map<std::pair<daemon::Topic, std::string>, std::vector<std::byte>> not_shown;
     std::size_t not_shown_bytes = 0;
     Delay delay;
-    std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
+    std::optional<std::chrono::nanoseconds> last_delay;  ///< delay of the last vector
   };
 
   /// The last vector of a machine, while it may be applied.
   struct Applied {
     v1::Compensation vector;
-    std::chrono::nanoseconds delay;  ///< when it arrived
+    std::chrono::nanoseconds delay;  ///< delay of the vector when it arrived
     WallClock::time_point arrived, valid_until;
   };
 
@@ -81,10 +82,10 @@ class WatchedMachines {
     WallClock::time_point last_live{};
     std::optional<WallClock::time_point> ignored_reported;
     bool without_identity_reported = false;
-    /// Why no publisher is pinned.
+    /// The reason why no publisher is pinned.
     std::string why_none = "no publisher has stated its identity (topic abbe/v1/Identity)";
 
-    /// nullptr: no publisher is pinned.
+    /// The pinned publisher; nullptr: none is pinned.
     [[nodiscard]] const Publisher* pinned() const {
       const auto found = pin.pinned() ? publishers.find(*pin.pinned()) : publishers.end();
       return found == publishers.end() ? nullptr : &found->second;
@@ -100,7 +101,8 @@ class WatchedMachines {
   };
 
   [[nodiscard]] bool alive(const Publisher* publisher) const;
-  /// Sum over the publishers of all machines: strangers may make up any.
+  /// Sum over the publishers of all machines. Limits apply to this sum because other participants
+  /// may publish under any number of names.
   template <class Value>
   [[nodiscard]] std::size_t total(Value value) const {
     std::size_t sum = 0;
@@ -123,7 +125,7 @@ class WatchedMachines {
                       const ParticipantId& former);
   /// Keeps a sample of a publisher that is not pinned until show_kept().
   void keep_for_later(const Arrival& arrival, Publisher& publisher);
-  /// Shows what arrived before the publisher was pinned.
+  /// Shows the samples that arrived before the publisher was pinned.
   void show_kept(const std::string& name, Machine& machine, Publisher& publisher);
   [[nodiscard]] static PublisherPin::Verdict judge(const Arrival& arrival, PublisherPin& pin);
   /// Reports once that the publisher is pinned by its name alone.
@@ -139,7 +141,8 @@ class WatchedMachines {
   Decision decide_on(Machine& machine, const Publisher& publisher, const v1::Compensation& c) const;
   /// Shows that the vector that was to be applied may not be applied any more.
   void withdraw(const std::string& name, Machine& machine);
-  /// One line of JSON, with the instant of CLOCK_MONOTONIC and the validity from then on.
+  /// Prints one line of JSON with the decision, the present time of CLOCK_MONOTONIC, and the
+  /// validity from this time on.
   static void print_decision(const v1::Compensation& c, const Decision& decision);
   /// Prints the line with position, vector and decision. On a terminal the line is updated in
   /// place; otherwise a new line is printed once a second.
@@ -151,8 +154,9 @@ class WatchedMachines {
   bool received_ = false;
   const bool on_terminal_;
   std::map<std::string, Machine> machines_;
-  std::map<std::pair<std::string, std::string>, std::string> health_;  // by machine and stream
-  std::map<std::string, std::string> calibration_;                     // by machine
+  // last shown state, by machine and stream
+  std::map<std::pair<std::string, std::string>, std::string> health_;
+  std::map<std::string, std::string> calibration_;  // last shown state, by machine
 };
 
 }  // namespace abbe::dds

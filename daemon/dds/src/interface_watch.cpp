@@ -31,14 +31,14 @@ int open_netlink() {
 }
 
 /// Reads and discards the waiting messages; true if there were any. Their content is not needed,
-/// because the caller then reads the interfaces.
+/// because the caller reads the state of all interfaces afterwards.
 bool has_messages(int netlink) {
   constexpr int kMostReads = 64;
   std::array<std::byte, 4096> message{};
   bool any = false;
   for (int i = 0; i < kMostReads; ++i) {
     const bool received = ::recv(netlink, message.data(), message.size(), 0) >= 0;
-    // ENOBUFS: the socket buffer overflowed, so messages were there
+    // ENOBUFS: the socket buffer overflowed, so there were messages
     if (!received && errno != ENOBUFS && errno != EINTR) break;
     any = true;
   }

@@ -26,12 +26,12 @@ namespace {
 namespace fast = eprosima::fastdds::dds;
 const auto kSuccess = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 
-/// Fast DDS tries so many ports for its participant. With its default of 100 the participants
-/// beyond the first hundred of a computer receive nothing, and no error is reported.
+/// Number of ports that Fast DDS tries for its participant. With its default of 100, participants
+/// after the first hundred on a computer would receive nothing, and no error would be reported.
 constexpr std::uint32_t kMostParticipantsOfAHost = 400;
 
-/// Most participants of the domain, and endpoints of all of them, that are kept: without a limit a
-/// stranger that announces ever new ones takes all memory.
+/// Most participants of the domain, and most endpoints of each, that Fast DDS keeps. Without a
+/// limit, another participant that announces endpoints without end would exhaust the memory.
 constexpr std::size_t kMostParticipants = 512, kMostEndpointsEach = 16;
 
 void limit_memory(fast::DomainParticipantQos& qos) {
@@ -81,7 +81,7 @@ bool has_property(const fast::DomainParticipantQos& qos, const char* name) {
          nullptr;
 }
 
-/// Whether the profile switches DDS Security on. Without an authentication plugin Fast DDS switches
+/// True if the profile switches DDS Security on. Without an authentication plugin Fast DDS switches
 /// it off, even if an access control plugin is set.
 bool has_security(const fast::DomainParticipantQos& qos) {
   return has_property(qos, "dds.sec.auth.plugin") && has_property(qos, "dds.sec.access.plugin");
@@ -128,7 +128,8 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   ABBE_TRY(interface_of_profile_is_up(*qos));
   ABBE_TRY(add_security(options, *qos));
 
-  // Also where the profile of a site was written before it had this value.
+  // The value is set here because the profile of a site may have been written before this value was
+  // added to the built-in profile.
   auto& tries = qos->wire_protocol().builtin.mutation_tries;
   tries = std::max(tries, kMostParticipantsOfAHost);
 
@@ -156,7 +157,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
 
 Result<fast::Topic*> Participant::topic(daemon::Topic topic) {
   const auto& traits = daemon::traits(topic);
-  // abbe-dds writes and reads Identity.
+  // abbe-dds both writes and reads Identity, so the topic may already exist.
   const std::string name(traits.name);
   if (auto* known = dynamic_cast<fast::Topic*>(participant_->lookup_topicdescription(name)))
     return known;

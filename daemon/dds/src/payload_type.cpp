@@ -62,8 +62,8 @@ InstanceHandle_t md5_of(const std::string& bytes) {
   return handle;
 }
 
-/// Numbers of one machine, up to kReceivedInstances, give different instances. The first octet
-/// makes the handle valid: zeros alone mean "none".
+/// The instance of a received sample. Numbers of one machine up to kReceivedInstances give
+/// different instances. The first octet is set because a handle of zeros means "none".
 InstanceHandle_t received_instance(std::string_view machine, std::uint32_t number,
                                    std::string_view text) {
   const auto hash = md5_of(std::string(machine) + '\0' + std::string(text));
@@ -109,8 +109,8 @@ std::function<uint32_t()> PayloadType::getSerializedSizeProvider(void* data) {
 bool PayloadType::getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*/) {
   const auto& payload = *static_cast<const Payload*>(data);
   const auto key = daemon::payload_key(topic_, payload.bytes);
-  // Fast DDS 2.9 aborts in a reader that gets a sample without key hash whose key cannot be read.
-  // All malformed payloads are one instance; decoding refuses them.
+  // A reader of Fast DDS 2.9 aborts if a sample without key hash has a key that cannot be read.
+  // Therefore all malformed payloads get the same instance; decoding refuses them later.
   if (payload.received) {
     *handle = key ? received_instance(key->machine, key->number.value_or(0), key->text.value_or(""))
                   : received_instance("", 0, "");

@@ -11,15 +11,15 @@ using eprosima::fastrtps::Duration_t;
 /// Lease of the liveliness of ModelState. abbe-dds asserts the liveliness explicitly
 /// (MANUAL_BY_TOPIC), and only while abbed is alive.
 const Duration_t kLivelinessLease(1, 0);
-/// A late joiner receives old samples after the next heartbeat; with Fast DDS's default period it
-/// would wait for up to 3 s.
+/// Heartbeat period of durable writers. A late joiner receives old samples after the next
+/// heartbeat; with Fast DDS's default period it would wait for up to 3 s.
 const Duration_t kHeartbeatPeriod(0, 100'000'000);
 
 /// Most instances of a topic. Fast DDS's default is 10, but a grid may have more slices and a
 /// machine more streams.
 constexpr int kMostInstances = 128;
-/// Writers and readers of other participants that an endpoint is matched with. A stranger that
-/// announces ever more of them would take all memory.
+/// Most writers or readers of other participants with which an endpoint is matched. Without a
+/// limit, another participant that announces endpoints without end would exhaust the memory.
 constexpr std::size_t kMostMatches = 512;
 constexpr int kInstancesAtStart = 4;
 
@@ -27,8 +27,8 @@ bool is_durable(daemon::Topic topic) {
   return daemon::traits(topic).kind == daemon::TopicTraits::Kind::Durable;
 }
 
-/// Sets the policies whose places are the same in the QoS types of writer and reader. The other
-/// policies of writer and reader agree in value, but not in place.
+/// Sets the policies that have the same place in the QoS types of writer and reader. The other
+/// policies have the same values for writer and reader, but other places in the types.
 template <class Qos>
 void set_common(daemon::Topic topic, Qos& qos) {
   qos.reliability().kind =
@@ -65,15 +65,17 @@ DataWriterQos writer_qos(daemon::Topic topic) {
 DataReaderQos reader_qos(daemon::Topic topic) {
   DataReaderQos qos;
   set_common(topic, qos);
-  // Two streams of a machine may have one instance: both must stay until they are taken. Not for
-  // the other topics: strangers may fill all places with 64 kB each.
+  // Two streams of a machine may share an instance, and both samples must stay until they are
+  // taken. The depth is 1 for the other topics, because other participants may fill all places with
+  // 64 kB each.
   const int depth = topic == daemon::Topic::Health ? 2 : 1;
   qos.history().depth = depth;
   qos.resource_limits().max_samples_per_instance = depth;
-  // Never full: a sample of any sender has one of kReceivedInstances instances.
+  // The history cannot become full: a sample of any sender has one of kReceivedInstances instances.
   qos.resource_limits().max_samples = kReceivedInstances * depth;
   qos.resource_limits().max_instances = kReceivedInstances;
-  // Each sample takes the memory that it needs: strangers may fill all places.
+  // Each sample allocates only the memory that it needs, because other participants may fill all
+  // places.
   qos.endpoint().history_memory_policy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   qos.reader_resource_limits().matched_publisher_allocation.maximum = kMostMatches;

@@ -26,7 +26,7 @@ namespace abbe::dds {
 namespace {
 
 namespace fast = eprosima::fastdds::dds;
-using Time = eprosima::fastrtps::rtps::Time_t;  // of the wall clock
+using Time = eprosima::fastrtps::rtps::Time_t;  // wall-clock time
 const auto kOk = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 
 WriterId writer_id(const eprosima::fastrtps::rtps::InstanceHandle_t& publication) {
@@ -57,7 +57,8 @@ class AliveWriters final : public fast::DataReaderListener {
     const auto lost = lost_at_.find(writer);
     if (lost != lost_at_.end() && !(lost->second < arrived)) return;
     if (lost != lost_at_.end()) lost_at_.erase(lost);
-    if (alive_.size() >= kMostAlive) alive_.clear();  // each is known again with its next sample
+    // each writer is added again with its next sample
+    if (alive_.size() >= kMostAlive) alive_.clear();
     alive_.insert(writer);
   }
 
@@ -78,7 +79,7 @@ class AliveWriters final : public fast::DataReaderListener {
     changed.set_trigger_value(true);
   }
 
-  /// Strangers come and go without end.
+  /// Removes the oldest entry of lost_at_, because participants may come and go without end.
   void forget_oldest_loss() {
     constexpr std::size_t kMostLosses = 1024;
     if (lost_at_.size() <= kMostLosses) return;
@@ -86,7 +87,7 @@ class AliveWriters final : public fast::DataReaderListener {
     lost_at_.erase(std::ranges::min_element(lost_at_, earlier));
   }
 
-  static constexpr std::size_t kMostAlive = 16384;  ///< more than there are matches
+  static constexpr std::size_t kMostAlive = 16384;  ///< more than the number of possible matches
 
   mutable std::mutex mutex_;
   std::set<WriterId> alive_;
@@ -163,8 +164,8 @@ void Readers::wait(std::chrono::milliseconds at_most) {
 }
 
 void Readers::take(const OnArrival& on_arrival) {
-  // Before each sample the identities that have arrived by then: it is judged for the machine that
-  // its publisher is at that moment.
+  // Takes a sample. Before it, the Identities that have arrived by then are taken, so that the
+  // sample is judged by the identity that its publisher has at this moment.
   const auto take_next = [&](const State::Reader& r) {
     fast::SampleInfo info;
     if (r.reader->take_next_sample(&state_->payload, &info) != kOk) return false;

@@ -37,9 +37,11 @@ void ReceivedModel::state(v1::ModelState state) {
 }
 
 void ReceivedModel::slice(v1::ErrorGrid slice) {
-  // Enough for the model that ModelState names, the next one, and remaining slices of old models.
+  // This is enough for the model that ModelState names, the next model, and remaining slices of old
+  // models.
   constexpr std::size_t kMostModels = 4;
-  // Several times what abbe-dds sends for the largest grid: a stranger must not fill the memory.
+  // This is several times the number that abbe-dds sends for the largest grid. The limit protects
+  // the memory against other participants.
   constexpr std::uint32_t kMostSlices = 32;
   if (slice.slices() == 0 || slice.slices() > kMostSlices || slice.slice() >= slice.slices())
     return;
@@ -97,8 +99,8 @@ Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanosecond
 
 std::optional<std::chrono::nanoseconds> Delay::of(const v1::Compensation& vector, Instant now) {
   constexpr std::chrono::nanoseconds kLongestStep = std::chrono::seconds{1};
-  // Longest time that is accepted in a vector. abbe-dds sends none longer, and the sum of two
-  // longer ones could overflow.
+  // Longest time that is accepted in a vector. abbe-dds sends no longer times, and the sum of two
+  // longer times could overflow.
   constexpr std::int64_t kLongest_ns = std::int64_t{1} << 60;
   for (const std::int64_t time : {vector.host_time_ns(), vector.age_ns()})
     if (time < 0 || time > kLongest_ns) return std::nullopt;

@@ -13,12 +13,13 @@
 namespace abbe::dds {
 namespace {
 
-/// Other publishers of this name or identity that are remembered; a stranger may make up more.
+/// Most publishers of this name or identity that are stored, because other participants may publish
+/// any number.
 constexpr std::size_t kMostClaims = 64;
-/// A publisher repeats its Identity every second.
+/// A publisher repeats its Identity every second; a claim older than this is no longer present.
 constexpr std::chrono::milliseconds kRepeated{1500};
 
-/// For people: without what would change a terminal or a log.
+/// The text without characters that could change a terminal or a log.
 std::string printable(std::string text) {
   std::ranges::replace_if(
       text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
@@ -62,7 +63,8 @@ void TwinWatch::take(const Arrival& arrival, const v1::Identity& own, Instant no
     return;
   }
   if (claims_.size() >= kMostClaims) {
-    // A publisher that repeats its Identity keeps its place.
+    // Removes the publisher that was silent longest; a publisher that repeats its Identity keeps
+    // its place.
     const auto quietest =
         std::ranges::min_element(claims_, {}, [](const auto& c) { return c.second.last; });
     if (now - quietest->second.last < kRepeated) return;
@@ -79,8 +81,8 @@ bool TwinWatch::has_id_of(const Claim& claim, const v1::Identity& own) {
   return !claim.machine_id.empty() && claim.machine_id == own.machine_id();
 }
 
-/// A copied identity before a copied name, then the one that was seen first: a stranger that comes
-/// later does not hide it.
+/// The text about the twins. It names a copied identity before a copied name, and otherwise the
+/// twin that was seen first, so that a participant that comes later does not hide it.
 std::string TwinWatch::in_words(const v1::Identity& own) const {
   const std::pair<const ParticipantId, Claim>* shown = nullptr;
   std::size_t twins = 0;

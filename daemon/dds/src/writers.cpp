@@ -16,9 +16,9 @@ std::size_t index_of(daemon::Topic topic) {
   return static_cast<std::size_t>(topic);
 }
 
-/// The writer, without readers, that is announced when DDS Security is on. Empty if the permissions
-/// of the site do not allow this writer; a new subscriber may then need up to a second to find the
-/// other writers.
+/// The additional writer without readers that is announced when DDS Security is on. Empty if the
+/// permissions of the site do not allow it; a new subscriber may then need up to a second to find
+/// the other writers.
 std::vector<eprosima::fastdds::dds::DataWriter*> announcement_writer(
     Participant& participant, eprosima::fastdds::dds::Publisher& publisher) {
   namespace fast = eprosima::fastdds::dds;

@@ -15,7 +15,7 @@ namespace {
 
 using TouchDetectorPointer = std::unique_ptr<drivers::TouchDetector>;
 
-/// Touch detector of the probe that is connected to the card; null without [probe].
+/// The touch detector of the probe that is connected to the card; null if there is no [probe].
 TouchDetectorPointer touch_detector_of(const Config& config) {
   const auto& probe = config.of<ProbeConfig>();
   if (!probe) return nullptr;

@@ -16,9 +16,9 @@ using protocol::HostTime;
 struct DeviceSet::State {
   std::vector<std::unique_ptr<RunningDevices>> started;  // in the order of starting
   std::vector<RunningDevices*> devices;                  // in the order of device_kinds()
-  MachineMotion* motion = nullptr;                       // of the measuring machine, if any
-  TrackerOrders* tracker = nullptr;                      // of the tracker, if any
-  /// By stream: the time of the previous health() and the number of samples at that time.
+  MachineMotion* motion = nullptr;   // motion functions of the measuring machine, if there is one
+  TrackerOrders* tracker = nullptr;  // orders of the tracker, if there is one
+  /// By stream: the time of the previous call of health(), and the number of samples at that time.
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;
 
   State() = default;

@@ -22,7 +22,7 @@ drivers::IppMachine unreadable(const std::filesystem::path& file, const std::str
 }
 
 /// State of the machine from the file. A missing file means that the machine awaits no release. If
-/// the file cannot be read, the machine is taken to await one.
+/// the file cannot be read, it is assumed that the machine awaits a release.
 drivers::IppMachine read_hold(const std::filesystem::path& file) {
   std::error_code failed;
   const auto status = std::filesystem::status(file, failed);
@@ -52,7 +52,7 @@ void keep_hold(const std::filesystem::path& data_dir, drivers::IppDeviceOptions&
   const drivers::IppMachine machine = read_hold(file);
   options.session.held = machine.held;
   options.session.moving = machine.moving;
-  // Shared by the two functions, which end with the device.
+  // The writer is shared by the two functions and is destroyed with the device.
   const auto writer = std::make_shared<MachineHoldWriter>(file, machine);
   options.machine_changed = [writer](const drivers::IppMachine& m) { writer->keep(m); };
   options.machine_stored = [writer] { return writer->stored(); };

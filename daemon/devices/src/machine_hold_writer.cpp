@@ -27,7 +27,8 @@ Result<void> write_machine(const std::filesystem::path& file, const drivers::Ipp
   }
 
   std::error_code failed;
-  // On a read-only file system the removal of a missing file fails as well.
+  // On a read-only file system the removal fails also if the file does not exist; this is not an
+  // error.
   if (std::filesystem::symlink_status(file, failed).type() == std::filesystem::file_type::not_found)
     return {};
   std::filesystem::remove(file, failed);
@@ -47,14 +48,14 @@ struct MachineHoldWriter::Work {
   void write(const State& state);
 
   std::filesystem::path file;
-  std::optional<drivers::IppMachine> in_file;  // nullopt: not known
-  std::uint64_t kept = 0;                      // of keep(): the number of the latest state
+  std::optional<drivers::IppMachine> in_file;  // content of the file; nullopt: not known
+  std::uint64_t kept = 0;                      // number of the latest state passed to keep()
   drivers::Mailbox<State> states = {};
   WakeUp wake = {}, ended = {};
   std::atomic<bool> ending{false};
   std::atomic<std::uint64_t> done{0};    // number of the latest state that is in the file
   std::atomic<std::uint64_t> failed{0};  // number of the latest state that could not be written
-  drivers::FaultText fault = {};         // why
+  drivers::FaultText fault = {};         // reason of the failure
 };
 
 MachineHoldWriter::MachineHoldWriter(std::filesystem::path file,
@@ -95,7 +96,8 @@ void MachineHoldWriter::Work::run() {
   (void)::pthread_setname_np(::pthread_self(), "abbe-cmm-hold");
   State latest;
   for (bool last = false; !last;) {
-    // acquire: pairs with the release of the destructor, whose thread calls keep() no more
+    // acquire: pairs with the release in the destructor. Its thread makes no further call of
+    // keep().
     last = ending.load(std::memory_order_acquire);
     for (State& state : states.take()) latest = std::move(state);
     const bool outstanding = latest.number != done.load(std::memory_order_relaxed);

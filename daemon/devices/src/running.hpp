@@ -18,12 +18,13 @@
 
 namespace abbe::daemon {
 
-/// Instead of the service of a device that is simulated.
+/// Advice in messages about a simulated device; for a real device the advice is to have it
+/// serviced.
 inline constexpr std::string_view kBusyComputer =
     "the device is simulated: this computer is too busy for it, give it less to do or a lower "
     "speed";
 
-/// Largest numbers of elements that are popped from a ring at once; several bursts of a device fit.
+/// Most elements that are popped from a ring at once; several bursts of a device fit.
 inline constexpr std::size_t kMostSamples = 1024;
 inline constexpr std::size_t kMostBlocks = 128;
 
@@ -64,7 +65,7 @@ struct Running {
 };
 
 template <class D>
-// `options` is moved, which clang-tidy 14 does not see in a template.
+// `options` is moved; clang-tidy 14 does not detect this in a template.
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device,
                        drivers::DeviceThreadOptions options) {

@@ -11,10 +11,11 @@
 namespace abbe::daemon {
 namespace {
 
-/// Least shares of the nominal samples within one and within two periods. A tracker sends a burst
-/// every 332 ms, so that one second has two to four of them.
+/// Least fractions of the nominal number of samples within one period and within two periods. A
+/// tracker sends a burst every 332 ms, so that a period of one second contains two to four bursts.
 constexpr double kLeastInOne = 0.5, kLeastInTwo = 0.8;
-constexpr double kFewestSamples = 20.0;  ///< with fewer the share depends on single samples
+/// with fewer samples the fraction depends on single samples
+constexpr double kFewestSamples = 20.0;
 
 }  // namespace
 

@@ -75,7 +75,8 @@ class RunningTracker final : public RunningDevices, private TrackerOrders {
   BlockBuffer blocks_;
 };
 
-/// A tracker that gives mean values of a target at rest sends when the target rests.
+/// Samples per second that the tracker sends; 0 for a tracker that sends mean values, because it
+/// sends them only while the target rests.
 double nominal_rate_hz(const TrackerConfig& config) {
   return config.mode == TrackerModeConfig::Continuous ? config.point_rate_hz : 0.0;
 }

@@ -9,7 +9,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// Tables by name, such as EAX.
+/// Tables by the name of the error, such as EAX.
 using ErrorTables = std::map<std::string, std::vector<TablePoint>, std::less<>>;
 
 bool is_component_error(std::string_view name) {
@@ -18,8 +18,8 @@ bool is_component_error(std::string_view name) {
          kAxes.find(name[2]) != kAxes.npos;
 }
 
-/// The displacement of the tool by all errors, first order. Each axis moves what is nearer to the
-/// tool than itself.
+/// The displacement of the tool by all errors, to first order. The errors of an axis move all axes
+/// between it and the tool, and the tool.
 AxisPosition displacement_mm(const ErrorTables& tables, const ControlSettings& settings,
                              const AxisPosition& position_mm) {
   AxisPosition arm{}, moved{};
@@ -58,7 +58,7 @@ Result<ControlCorrection> correction_of(const ExportFile& file, ErrorTables tabl
   };
 }
 
-/// Header of a block: the argument, then the tables that depend on it.
+/// True for a valid header of a block: the argument, then the tables that depend on it.
 bool valid_header(std::span<const std::string_view> words, const ErrorTables& tables) {
   if (words.size() < 2 || words[0].size() != 1) return false;
   for (const auto name : words.subspan(1)) {

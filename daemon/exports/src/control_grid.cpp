@@ -1,4 +1,4 @@
-// A receiver of csv-grid: trilinear interpolation.
+// Reads and evaluates csv-grid as a receiver of the format does: by trilinear interpolation.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ std::optional<std::array<double, 7>> grid_row(std::string_view text) {
   return row;
 }
 
-/// Lower line of the cell and the fraction of the cell.
+/// The index of the lower grid line of the cell, and the position in the cell as a fraction.
 std::pair<std::size_t, double> place_in(const std::vector<double>& lines, double q) {
   std::size_t i = 0;
   while (i + 2 < lines.size() && q >= lines[i + 1]) ++i;
@@ -59,7 +59,7 @@ AxisPosition in_grid(const CorrectionGrid& grid, const AxisPosition& position_mm
   return c_um;
 }
 
-/// Sorts the coordinates; false unless every combination of them is a node.
+/// Sorts the coordinates. False unless every combination of them is a node.
 bool complete(CorrectionGrid& grid) {
   std::size_t nodes = 1;
   for (auto& lines : grid.lines_mm) {

@@ -11,7 +11,8 @@ namespace {
 
 struct TextTable {
   std::vector<std::string_view> columns;
-  std::vector<std::pair<std::size_t, std::vector<std::string_view>>> rows;  ///< with line number
+  /// each row with its line number
+  std::vector<std::pair<std::size_t, std::vector<std::string_view>>> rows;
 };
 
 /// One column of a .COM table.
@@ -80,7 +81,7 @@ Result<void> add_functions(const ExportFile& file, std::size_t input,
   return {};
 }
 
-/// Row of config.cma that is active.
+/// The active row of config.cma.
 const std::vector<std::string_view>* active_row(const TextTable& table) {
   if (table.columns.size() < 2 || table.columns[1] != "ACTIVE") return nullptr;
   const std::vector<std::string_view>* active = nullptr;

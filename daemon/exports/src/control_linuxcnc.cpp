@@ -13,7 +13,8 @@ struct JointTrim {
   std::vector<TablePoint> forward, reverse;
 };
 
-/// The loader ends at the first line that is not three numbers, without a message.
+/// Reads a file as LinuxCNC does: its loader ends without a message at the first line that is not
+/// three numbers.
 Result<JointTrim> read_joint(const ExportFile& file) {
   JointTrim trim;
   for (const TextLine& line : lines_of(file.text, "")) {
@@ -35,7 +36,7 @@ Result<JointTrim> read_joint(const ExportFile& file) {
   return trim;
 }
 
-/// In mm: with a direction, or the mean of both.
+/// The correction in mm: for a direction of travel, or the mean of both directions for direction 0.
 double trim_mm(const JointTrim& joint, double position_mm, int direction) {
   const double forward = on_table(joint.forward, position_mm);
   const double reverse = on_table(joint.reverse, position_mm);

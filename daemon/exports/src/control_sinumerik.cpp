@@ -10,14 +10,14 @@
 namespace abbe::daemon {
 namespace {
 
-/// "$AN_CEC_STEP[0]=6.73": variable, indices, value.
+/// One assignment: "$AN_CEC_STEP[0]=6.73" has a variable, indices and a value.
 struct Assignment {
   std::size_t line = 0;
   std::string_view variable, value;
   std::vector<std::string_view> indices;
 };
 
-/// All values of one table.
+/// The values of one table as assigned in the file.
 struct CompensationTable {
   std::map<std::size_t, double> points;
   std::optional<double> step, min, max;
@@ -49,7 +49,7 @@ std::optional<Assignment> assignment(const TextLine& line) {
   }
 }
 
-/// A whole number from 0 to 99999.
+/// The text as a whole number from 0 to 99999; nullopt otherwise.
 std::optional<std::size_t> table_index(std::string_view text) {
   const auto number = plain_number(text);
   if (!number || *number < 0.0 || *number > 99999.0 || *number != std::floor(*number))
@@ -57,7 +57,7 @@ std::optional<std::size_t> table_index(std::string_view text) {
   return static_cast<std::size_t>(*number);
 }
 
-/// Frame of the file: first line, CHANDATA(1), assignments, M17.
+/// The assignments of a file, whose frame is checked: first line, CHANDATA(1), assignments, M17.
 Result<std::vector<Assignment>> assignments_of(const ExportFile& file, std::string_view header) {
   std::vector<Assignment> all;
   bool begun = false, ended = false;
@@ -88,7 +88,7 @@ bool set_number(std::optional<double>& to, std::string_view text) {
   return first && to.has_value();
 }
 
-/// `rest`: name of the variable after AN_CEC or AA_ENC_COMP.
+/// Sets a value of the table. `rest`: name of the variable after AN_CEC or AA_ENC_COMP.
 bool set_field(CompensationTable& table, std::string_view rest, const Assignment& a) {
   if (rest == "_STEP") return set_number(table.step, a.value);
   if (rest == "_MIN") return set_number(table.min, a.value);
@@ -141,7 +141,7 @@ bool set_lec(std::map<std::size_t, CompensationTable>& tables, const Assignment&
   return a.indices.size() == 2 && set_field(table, rest, a);
 }
 
-/// Points at MIN + i STEP; MAX must be the last of them.
+/// Makes the active table. Its points are at MIN + i STEP; MAX must be the last of them.
 Result<ActiveTable> activated(const ExportFile& file, std::size_t t,
                               const CompensationTable& table) {
   const auto fault = [&](const std::string& what) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The tables that controls interpolate, and the texts from which they read them.
+/// Interpolates the tables of controls, and parses the texts from which controls read them.
 
 #include <array>
 #include <optional>
@@ -12,28 +12,30 @@
 
 namespace abbe::daemon {
 
-/// Position and value, both in the unit of the file.
+/// A position and a value, both in the unit of the file.
 struct TablePoint {
   double position = 0.0, value = 0.0;
 };
 
-/// Straight line between points with ascending positions; the value of the first or last point
-/// beyond them.
+/// The table's value at `position`: a straight line between points with ascending positions; beyond
+/// the first or last point the value of this point.
 [[nodiscard]] double on_table(std::span<const TablePoint> points, double position);
-/// Empty, or why a control cannot use the points: fewer than 2, or positions do not ascend.
+/// The reason why a control cannot use the points: there are fewer than 2, or their positions do
+/// not ascend. Empty: it can use them.
 [[nodiscard]] std::string table_fault(std::span<const TablePoint> points);
 
-/// A line with its number, without a comment that begins with `comment` (empty: no comments).
+/// A line with its number. A comment, which begins with `comment`, is removed (empty: the format
+/// has no comments).
 struct TextLine {
   std::size_t number = 0;
   std::string_view text;
 };
 [[nodiscard]] std::vector<TextLine> lines_of(std::string_view text, std::string_view comment);
-/// Separated by blanks, tabs and carriage returns.
+/// The words of the line, separated by blanks, tabs and carriage returns.
 [[nodiscard]] std::vector<std::string_view> words_of(std::string_view line);
 /// The whole text as a decimal number of at most 1e6; nullopt otherwise.
 [[nodiscard]] std::optional<double> plain_number(std::string_view text);
-/// BadInput "NAME:LINE: what".
+/// The Error BadInput with the text "NAME:LINE: what".
 [[nodiscard]] tl::unexpected<Error> at_line(const std::string& file, std::size_t line,
                                             std::string what);
 

@@ -1,4 +1,5 @@
-// Formats of tables that add to one axis: LinuxCNC, Siemens, Heidenhain; and the grid.
+// Writers for formats of tables that add to one axis (LinuxCNC, Siemens, Heidenhain), and for the
+// grid.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -29,7 +30,7 @@ double step_m(const std::vector<double>& nodes) {
   return (nodes.back() - nodes.front()) / static_cast<double>(nodes.size() - 1);
 }
 
-/// Number `t` of the tables; `direction` as $AN_CEC_DIRECTION.
+/// The assignments of table number `t`; `direction` is the value of $AN_CEC_DIRECTION.
 std::string cec_table(std::size_t t, const HeldTable& table, const HeldTables& held,
                       const WriteOptions& options, int direction) {
   const auto& nodes = held.nodes_m[calib::index(table.motion.axis)];
@@ -67,7 +68,7 @@ std::string lec_table(const HeldTable& table, const HeldTables& held, const Writ
   return text + fmt::format("$AA_ENC_COMP_IS_MODULO[0,{}]=0\n", axis);
 }
 
-/// Columns of the corrected axes, rows of the positions of one axis.
+/// A .COM table: its columns are the corrected axes, its rows the positions of one axis.
 std::string com_table(calib::Axis axis, const HeldTables& held, const WriteOptions& options) {
   std::vector<const HeldTable*> tables;
   std::string text = "NR AXISPOS";

@@ -46,7 +46,8 @@ ExportFiles write_etalon(const calib::HeldTables& held, const WriteOptions& opti
     text += fmt::format("[{}]\nGridpoints = {{\n", name);
     for (std::size_t i = 0; i < nodes.size(); ++i)
       text += fixed_mm(nodes[i]) + " " + file_value(table, i, options.positive_moves) + "\n";
-    // Comments are known only after the end of a table, so each has all of it.
+    // Comments are recognised only after the end of a table, so each table repeats the whole
+    // origin.
     text += fmt::format("}} // end of {}; {}\n", name,
                         origin_in_one_line(options.origin, sign_text(options.positive_moves)));
   }

@@ -15,14 +15,16 @@ std::string without_minus_zero(std::string text) {
   return zero && text.front() == '-' ? text.substr(1) : text;
 }
 
-/// A comment must stay one line, and must not hold what a control may not read.
+/// `text` with "?" for characters that a control may not accept, and on one line, so that it can be
+/// a comment.
 std::string printable(std::string_view text) {
   std::string out;
   for (const char c : text) out += c >= ' ' && c <= '~' ? c : '?';
   return out;
 }
 
-/// Reasons may be long; a control may limit the length of a line.
+/// Adds `text`, divided into several lines: reasons may be long, and a control may limit the length
+/// of a line.
 void add_lines(std::string_view text, std::vector<std::string>& lines) {
   constexpr std::size_t kLongest = 100;
   while (text.size() > kLongest) {
@@ -34,7 +36,7 @@ void add_lines(std::string_view text, std::vector<std::string>& lines) {
   lines.emplace_back(text);
 }
 
-/// One line each.
+/// The statements of a file, one line each.
 std::vector<std::string> statements_of(const ExportOrigin& origin, std::string_view sign) {
   std::vector<std::string> all{fmt::format("abbe export of model {}", origin.model_hash)};
   for (const std::string& text : origin.use) add_lines(printable(text), all);

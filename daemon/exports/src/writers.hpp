@@ -1,5 +1,5 @@
 #pragma once
-/// A writer for each format, and what they share.
+/// The writer of each format, and functions that they share.
 
 #include "abbe/exports/write_export.hpp"
 
@@ -15,7 +15,7 @@ using ExportFiles = std::vector<ExportFile>;
 [[nodiscard]] ExportFiles write_heidenhain(const calib::HeldTables&, const WriteOptions&);
 [[nodiscard]] ExportFiles write_csv_grid(const calib::HeldGrid&, const WriteOptions&);
 
-/// A length in mm to 1e-9 mm, without "-0".
+/// A length in mm, rounded to 1e-9 mm, without "-0".
 [[nodiscard]] std::string fixed_mm(double value_m);
 /// The correction at node i of a table in the unit of the file: mm, or rad to 1e-12 rad.
 /// `direction`: +1, -1, or 0 for the mean.
@@ -24,9 +24,9 @@ using ExportFiles = std::vector<ExportFile>;
 /// The origin as comment lines, each after `mark`.
 [[nodiscard]] std::string origin_comment(const ExportOrigin&, std::string_view mark,
                                          std::string_view sign);
-/// The same in one line, without mark.
+/// The origin in one line, without a mark.
 [[nodiscard]] std::string origin_in_one_line(const ExportOrigin&, std::string_view sign);
-/// Sign of the file in words.
+/// The sign of the file as a sentence.
 [[nodiscard]] std::string sign_text(int positive_moves);
 
 }  // namespace abbe::daemon

@@ -1,7 +1,7 @@
 #pragma once
-/// Checks the bounds of abbe_v1.idl. One overload of visit() per type lists its bounded members in
-/// the order of the IDL. The lists are written by hand because Fast CDR has neither reflection nor
-/// bound checks; a test compares them with the text of the IDL.
+/// Checks the bounds that abbe_v1.idl defines. One overload of visit() per type lists its bounded
+/// members in the order of the IDL. The lists are written by hand because Fast CDR has neither
+/// reflection nor bound checks; a test compares them with the text of the IDL.
 
 #include <algorithm>
 #include <array>

@@ -73,7 +73,8 @@ bool set_subject(X509* certificate, const std::string& common_name) {
                                     -1, 0) == 1;
 }
 
-/// The authority signs certificates (keyCertSign) and documents (digitalSignature).
+/// Sets the permitted uses of a key. The authority signs certificates (keyCertSign) and documents
+/// (digitalSignature).
 bool set_uses(X509* certificate, X509* issuer, bool is_authority) {
   return add_extension(certificate, issuer, NID_basic_constraints,
                        is_authority ? "critical,CA:TRUE" : "critical,CA:FALSE") &&

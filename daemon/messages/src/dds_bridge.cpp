@@ -58,7 +58,7 @@ struct DdsBridge::State {
     if (topic == Topic::ErrorGrid) follow_slices(payload);
   }
 
-  /// Disposes the slices with a number beyond those of the grid that `payload` belongs to: they
+  /// Disposes the slices with a number beyond those of the grid that `payload` belongs to. They
   /// belong to another model, perhaps of an earlier abbed, and DDS would retain them for late
   /// joiners.
   void follow_slices(std::span<const std::byte> payload) {

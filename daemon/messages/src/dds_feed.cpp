@@ -60,8 +60,8 @@ struct DdsFeed::State {
     static_cast<void>(::send(peer.get(), &alive, 1, MSG_DONTWAIT | MSG_NOSIGNAL));
   }
 
-  /// Tried again with the next cycle if the socket is full; a part is never sent, because abbed
-  /// reads at once what is this short.
+  /// Sends the report of a twin. If the socket is full, the next cycle tries again. The report is
+  /// never sent in part, because it is short and abbed reads at once.
   void report(const std::string& twin) {
     if (!peer || twin == reported_twin) return;
     const auto bytes = twin_report(twin);

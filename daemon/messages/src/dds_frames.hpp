@@ -1,7 +1,7 @@
 #pragma once
 /// The frames on the local socket from abbed to abbe-dds: a header of 16 bytes, then a payload.
-/// abbe-dds answers each beat with the byte 00, and reports what it sees of another publisher that
-/// claims to be this machine: 01, the length of the text in two bytes, little endian, the text.
+/// abbe-dds answers each beat with the byte 00. It reports another publisher that claims to be this
+/// machine with the byte 01, the length of the text in two bytes (little endian), and the text.
 ///
 ///   bytes 0..3  length of the payload, little endian
 ///   byte  4     kind
@@ -89,7 +89,7 @@ class AnswerReader {
   std::string text_, twin_;
 };
 
-/// The report for AnswerReader; a longer text is cut.
+/// The report in the form that AnswerReader reads; a text that is too long is truncated.
 inline std::vector<std::byte> twin_report(std::string_view text) {
   text = text.substr(0, kLongestTwinText);
   std::vector<std::byte> bytes{kAnswerTwin, static_cast<std::byte>(text.size() & 0xffu),

@@ -49,12 +49,12 @@ Result<void> check_folder_is_empty(const fs::path& folder) {
                           folder.string()));
 }
 
-/// Data common to all identities of one folder.
+/// The data for all identities of one folder.
 struct Issuer {
   fs::path folder;
   ValidityPeriod period;
   Credentials authority;
-  std::string governance;  ///< signed
+  std::string governance;  ///< the signed governance document
 };
 
 Result<void> make_identity(const Issuer& issuer, const std::string& name, DdsRole role) {

@@ -32,14 +32,14 @@ bool may_connect(int fd, const DdsLinkPeer& peer) {
   if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return false;
   const DdsProcess* const process = peer.process;
   if (process == nullptr) return credentials.uid == (peer.user ? peer.user->uid : ::geteuid());
-  // A process of another PID namespace has the pid 0, which pid() also returns while no abbe-dds
-  // runs.
+  // A process of another PID namespace has the pid 0. This must not match: pid() also returns 0
+  // while no abbe-dds runs.
   return credentials.pid != 0 && credentials.pid == process->pid();
 }
 
-/// Lets the group of `user` open the socket. A folder with the setgid bit has done so already, and
-/// abbed.service does not permit chown(). Io: after a person has corrected the folder, a restart
-/// succeeds.
+/// Lets the group of `user` open the socket. If the folder has the setgid bit, the socket has this
+/// group already, and chown() is not needed (abbed.service does not permit it). The Error has the
+/// code Io, because a restart succeeds after a person has corrected the folder.
 Result<void> open_to_group(const std::filesystem::path& socket,
                            const std::optional<Account>& user) {
   if (!user) return {};
@@ -123,7 +123,7 @@ void DdsLink::State::accept_newest() {
   }
 }
 
-/// Reads the answers to beats, and reports of twins.
+/// Reads the answers to beats, and the reports of twins.
 void DdsLink::State::read_answers() {
   std::array<std::byte, 512> bytes{};
   const ssize_t n = ::recv(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
@@ -141,7 +141,7 @@ void DdsLink::State::disconnect() {
   live.entries().clear();
 }
 
-/// True if the next frame can be sent.
+/// Sends the waiting bytes. True if the next frame can be sent.
 bool DdsLink::State::send_waiting() {
   while (peer && out_begin < out.size()) {
     const ssize_t n = ::send(peer.get(), out.data() + out_begin, out.size() - out_begin,
@@ -171,7 +171,7 @@ bool DdsLink::State::send_now(const Frame& frame) {
   return static_cast<bool>(peer);
 }
 
-/// True if no durable sample waits.
+/// Sends the waiting durable samples. True if none waits any more.
 bool DdsLink::State::send_durable() {
   for (auto& entry : durable.entries()) {
     if (!entry.extra.to_send) continue;
@@ -188,7 +188,8 @@ void DdsLink::State::send_live() {
   while (next != waiting.end() &&
          send_now({FrameKind::Publish, next->topic, next->extra, next->payload}))
     ++next;
-  if (peer) waiting.erase(waiting.begin(), next);  // else disconnect() has dropped them
+  // otherwise disconnect() has removed them already
+  if (peer) waiting.erase(waiting.begin(), next);
 }
 
 /// Sends a live sample. While the socket is full the sample waits, and replaces a waiting one of

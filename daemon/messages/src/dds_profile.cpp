@@ -12,7 +12,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-/// All children called `name` of the elements `of`.
+/// All children with the name `name` of the elements `of`.
 std::vector<const XMLElement*> children(const std::vector<const XMLElement*>& of,
                                         const char* name) {
   std::vector<const XMLElement*> found;

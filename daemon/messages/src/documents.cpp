@@ -48,7 +48,7 @@ std::string governance_document() {
 std::string permissions_document(const std::string& common_name, DdsRole role,
                                  ValidityPeriod period) {
   const char* const may = role == DdsRole::Daemon ? "publish" : "subscribe";
-  // The daemon looks for other machines of its name.
+  // The daemon also reads Identity, to detect other machines with its name.
   const char* const twins =
       role == DdsRole::Daemon
           ? "<subscribe><topics><topic>abbe/v1/Identity</topic></topics></subscribe>"

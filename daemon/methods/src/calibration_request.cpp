@@ -18,8 +18,8 @@ namespace {
 
 using nlohmann::json;
 
-// The text of an attachment begins with this key. The number after the key has a fixed width, so
-// that set_from() can replace it.
+// Beginning of the text of an attachment. The number after this key has a fixed width, so that
+// set_from() can replace it in place.
 constexpr std::string_view kFromKey = R"({"from_ns":)";
 constexpr std::size_t kDigitsOfFrom = 20;
 

@@ -21,7 +21,7 @@ constexpr bool kGuided = requires(Acquisition& acquisition) {
   acquisition.take_notes();
 };
 
-/// True if the method has tables while the machine moves.
+/// True if the method has tables that can be shown while the machine moves.
 template <class Acquisition>
 constexpr bool kLive = requires(Acquisition& acquisition) {
   acquisition.take_news();
@@ -189,7 +189,8 @@ CalibrationRun run_of(Acquisition acquired) {
 }
 
 void CalibrationSession::not_identified(const Error& why, HostTime now) {
-  if (stage_ == SessionStage::Ending) {  // cancelled meanwhile: refused already
+  if (stage_ == SessionStage::Ending) {  // the session was cancelled meanwhile and is refused
+                                         // already
     (void)go(SessionStep::NoModel, now);
     return;
   }
@@ -241,7 +242,7 @@ bool CalibrationSession::go(SessionStep step, HostTime now) {
   return true;
 }
 
-/// A step that is an event.
+/// Makes a step that is also an event.
 bool CalibrationSession::enter(SessionStep step, std::string reason, HostTime now) {
   if (!go(step, now)) return false;
   if (stage_ != SessionStage::Acquiring) status_.remaining.reset();

@@ -13,7 +13,7 @@ bool is_finite(const RunResidual& r) {
   return std::isfinite(r.before_m) && std::isfinite(r.after_m);
 }
 
-/// Of residuals of one part, or of neighbouring parts.
+/// Sums over the residuals of one part, or of neighbouring parts.
 class PartSums {
  public:
   void add(const RunResidual& r) {
@@ -27,7 +27,7 @@ class PartSums {
         part_.time_s ? std::array{std::min((*part_.time_s)[0], t), std::max((*part_.time_s)[1], t)}
                      : std::array{t, t};
   }
-  /// Not for a part without residuals.
+  /// The figures of the part. Requires at least one residual.
   [[nodiscard]] RunFigures::Part part(std::string name) const {
     RunFigures::Part done = part_;
     const auto n = static_cast<double>(part_.count);
@@ -39,7 +39,7 @@ class PartSums {
   [[nodiscard]] bool is_empty() const { return part_.count == 0; }
 
  private:
-  RunFigures::Part part_;  ///< sums of squares instead of rms
+  RunFigures::Part part_;  ///< contains sums of squares instead of rms
 };
 
 std::vector<RunFigures::Part> parts_of(const std::vector<std::string>& names,
@@ -62,7 +62,7 @@ std::vector<RunFigures::Part> parts_of(const std::vector<std::string>& names,
 
 using Point = RunFigures::Series::Point;
 
-/// Smallest and largest point of each of equal intervals, in their order.
+/// The smallest and the largest point of each of equal intervals, in the order of the series.
 std::vector<Point> thinned(const std::vector<Point>& all) {
   constexpr std::size_t kMost = RunFigures::Series::kMostPoints;
   if (all.size() <= kMost) return all;
@@ -104,7 +104,8 @@ RunFigures::Series series_of(std::span<const RunResidual> residuals) {
   return series;
 }
 
-/// Empty if an uncertainty is not known.
+/// The counts of residuals by size relative to their uncertainty; empty if an uncertainty is not
+/// known.
 std::vector<std::size_t> sigma_counts_of(std::span<const RunResidual> residuals) {
   constexpr std::size_t kIntervals = RunFigures::kSigmaIntervals;
   constexpr double kMost = RunFigures::kMostSigmas;
@@ -127,7 +128,7 @@ RunFigures run_figures(const calib::Verdict& verdict, std::string_view held_out)
   return {.held_out = std::string(held_out),
           .held_out_before_m = or_none(verdict.held_out.no_compensation_rms_m),
           .held_out_after_m = or_none(verdict.held_out.candidate_rms_m),
-          .notes = {},  // in ModelDocument::verdict
+          .notes = {},  // the notes are in ModelDocument::verdict
           .residuals = {}};
 }
 

@@ -5,7 +5,7 @@
 namespace abbe::daemon {
 
 void TemperatureRange::add(double temperature_K) {
-  if (!(temperature_K > 0.0)) return;  // not measured: 0 or not a number
+  if (!(temperature_K > 0.0)) return;  // not measured: the value is 0 or NaN
   if (!range_K_) range_K_ = {temperature_K, temperature_K};
   (*range_K_)[0] = std::min((*range_K_)[0], temperature_K);
   (*range_K_)[1] = std::max((*range_K_)[1], temperature_K);

@@ -35,13 +35,13 @@ std::string first_word_of(const fs::path& file) {
   return {};
 }
 
-/// 128 bits are enough to tell computers apart.
+/// The mark of a text: 128 bits of a hash, which is enough to distinguish computers.
 std::string mark_of(std::string_view what, const std::string& text) {
   return sha256_hex(fmt::format("abbe computer {}: {}", what, text)).substr(0, 32);
 }
 
-/// Whether `address`, "52:54:00:12:34:56", was given by the manufacturer of the card. Others are
-/// random, or set by software.
+/// True if the manufacturer of the card gave `address`, "52:54:00:12:34:56". Other addresses are
+/// random or set by software.
 bool is_permanent(const std::string& address) {
   if (address.size() != 17) return false;
   const auto digits = std::string_view{"0123456789abcdef"};
@@ -50,15 +50,16 @@ bool is_permanent(const std::string& address) {
   return low != std::string_view::npos && (low & 2u) == 0 && !zero;
 }
 
-/// A network card of the computer: it has a device, and the device is not plugged into USB.
+/// True for a network card of the computer: the interface has a device, and the device is not
+/// plugged into USB.
 bool is_built_in(const fs::path& interface) {
   std::error_code none;
   if (!fs::exists(interface / "device", none)) return false;
   return fs::read_symlink(interface / "device" / "subsystem", none).filename() != "usb";
 }
 
-/// From getrandom(2): abbed.service hides /proc/sys, where the kernel offers one. Empty: the kernel
-/// gives no random numbers.
+/// A random UUID from getrandom(2), because abbed.service hides /proc/sys, where the kernel offers
+/// one. Empty: the kernel gives no random numbers.
 std::string random_uuid() {
   try {
     return boost::uuids::to_string(boost::uuids::random_generator_pure{}());
@@ -98,14 +99,15 @@ json identity_json(const MachineIdentity& identity) {
           {"events", std::move(events)}};
 }
 
-/// nullopt: there is none. Throws json::exception as below.
+/// The place in the event; nullopt: it has none. Throws json::exception as below.
 std::optional<StorePlace> store_place_from(const json& event) {
   if (!event.contains("store")) return std::nullopt;
   const json& place = event.at("store");
   return StorePlace{place.at("events").get<std::size_t>(), place.at("last").get<std::string>()};
 }
 
-/// Throws json::exception if a member is missing or has the wrong type.
+/// The event in a JSON object; nullopt: its action is not known. Throws json::exception if a member
+/// is missing or has the wrong type.
 std::optional<IdentityEvent> identity_event_from(const json& object) {
   const auto action = std::ranges::find(kIdentityActions, object.at("action").get<std::string>());
   const auto when = utc_from_text(object.at("when").get<std::string>());
@@ -118,7 +120,7 @@ std::optional<IdentityEvent> identity_event_from(const json& object) {
                        .store = store_place_from(object)};
 }
 
-/// nullopt: a value cannot be used. Throws json::exception as above.
+/// The identity in the document; nullopt: a value cannot be used. Throws json::exception as above.
 std::optional<MachineIdentity> identity_from(const json& document) {
   if (document.at("schema").get<std::string>() != kIdentitySchema) return std::nullopt;
   const json& computer = document.at("computer");
@@ -145,19 +147,19 @@ std::string store_event_text(const StoreEvent& event) {
   return fmt::format("{} {}", event.id, to_text(event.actor.when));
 }
 
-/// Whether the events before `place` are those of `history`.
+/// True if the events before `place` are those of `history`.
 bool is_place_of(const StorePlace& place, std::span<const StoreEvent> history) {
   if (place.events > history.size()) return false;
   return place.events == 0 || store_event_text(history[place.events - 1]) == place.last;
 }
 
-/// Whether event `i` of the store is later than `decision`.
+/// True if event `i` of the store is later than `decision`.
 bool is_later(std::span<const StoreEvent> history, std::size_t i, const IdentityEvent& decision) {
   if (decision.store && is_place_of(*decision.store, history)) return i >= decision.store->events;
   return history[i].actor.when >= decision.when;
 }
 
-/// The store may not exist yet: then it has no events.
+/// The end of the store's list of events. A store that does not exist yet has no events.
 std::optional<StorePlace> end_of_store(const fs::path& data_dir) {
   const auto history = ModelStore{data_dir / "models"}.history();
   if (!history) return std::nullopt;
@@ -314,7 +316,7 @@ Result<std::optional<MachineIdentity>> identity_of(const ModelStore& store) {
 std::string identity_doubt(const ModelStore& store, const std::string& id,
                            const ComputerMarks& here) {
   const auto identity = identity_of(store);
-  // A damaged file may hide that a person has not decided yet.
+  // A damaged file is reported, because it may hide that a person still has to decide.
   if (!identity) return identity.error().code == ErrorCode::BadInput ? identity.error().text : "";
   if (!*identity) return {};
   if (auto why = why_not_confirmed(**identity, here); !why.empty()) return why;

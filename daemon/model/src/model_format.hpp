@@ -10,11 +10,11 @@ namespace abbe::daemon {
 
 inline constexpr std::string_view kModelSchema = "abbe/model/1";
 inline constexpr std::string_view kVersion = ABBE_VERSION;
-/// What the residuals of RunFigures::Series are over.
+/// The abscissa of RunFigures::Series: time or number.
 inline constexpr std::string_view kOverTime = "time_s", kOverNumber = "number";
 inline constexpr std::string_view kLegendre = "legendre";  ///< basis of a polynomial model
 
-// Shift of the decimal point between SI and the file.
+// Shift of the decimal point between SI and the unit in the file.
 inline constexpr int kMm = 3;
 inline constexpr int kMicroUnit = 6;          // um, urad
 inline constexpr int kMicroUnitSquared = 12;  // their products
@@ -25,7 +25,8 @@ inline constexpr int kMicroUnitSquared = 12;  // their products
   return interpolation ? calib::name(*interpolation) : kLegendre;
 }
 
-/// Tables: their nodes; polynomials: the grid at which they are checked.
+/// The nodes that the file contains: for tables their nodes, for polynomials the grid at which they
+/// are checked.
 [[nodiscard]] inline const calib::MachineNodes& stored_nodes(const calib::VolumetricModel& model) {
   return model.tables() == nullptr ? model.nodes() : model.tables()->layout().nodes();
 }
@@ -33,7 +34,7 @@ inline constexpr int kMicroUnitSquared = 12;  // their products
 [[nodiscard]] inline std::string_view unit_of(const calib::Parameter& p) {
   return p.is_angle() ? "urad" : "um";
 }
-/// Of a difference between the directions of travel.
+/// The unit of a difference between the directions of travel.
 [[nodiscard]] inline std::string_view unit_of(const calib::ErrorMotion& m) {
   return calib::is_rotation(m.motion) ? "urad" : "um";
 }

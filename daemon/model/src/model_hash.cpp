@@ -13,9 +13,9 @@ namespace abbe::daemon {
 
 namespace {
 
-/// Canonical byte stream of a model: numbers as little-endian bytes of IEEE 754 doubles, each list
-/// and text preceded by its length, so that different models have different streams. Minus zero is
-/// written as zero.
+/// Canonical byte stream of a model. Numbers are written as little-endian bytes of IEEE 754
+/// doubles; each list and text is preceded by its length, so that different models have different
+/// streams. Minus zero is written as zero.
 class Canonical {
  public:
   void text(std::string_view value) {
@@ -76,8 +76,8 @@ void add_values(Canonical& out, const calib::VolumetricModel& model) {
     for (Eigen::Index j = i; j < covariance.cols(); ++j) out.number(covariance(i, j));
 }
 
-/// Added last and only if present: the hash of a model without an artefact temperature is that of
-/// earlier versions of abbe.
+/// Adds the thermal expansion of the artefact. It is added last and only if present, so that the
+/// hash of a model without it is the same as in earlier versions of abbe.
 void add_artefact(Canonical& out, const calib::Expansion& artefact) {
   out.text("artefact");
   for (const double value : {artefact.alpha_per_K, artefact.u_alpha_per_K, artefact.temperature_K,
@@ -85,7 +85,8 @@ void add_artefact(Canonical& out, const calib::Expansion& artefact) {
     out.number(value);
 }
 
-/// Only if V depends on the direction of travel: other models have the hash of earlier versions.
+/// Adds the differences between the directions of travel. They are added only if V depends on the
+/// direction, so that other models have the same hash as in earlier versions.
 void add_travel(Canonical& out, const calib::TravelDifferences& travel) {
   out.text("travel");
   out.text(calib::backlash_name(travel.kind));
@@ -97,7 +98,8 @@ void add_travel(Canonical& out, const calib::TravelDifferences& travel) {
   }
 }
 
-/// Only if the model has a misfit: other models have the hash of earlier versions.
+/// Adds the misfit. It is added only if the model has one, so that other models have the same hash
+/// as in earlier versions.
 void add_misfit(Canonical& out, const calib::Misfit& misfit) {
   out.text("misfit");
   out.count(static_cast<std::size_t>(misfit.u_of_parameters.size()));
@@ -107,7 +109,7 @@ void add_misfit(Canonical& out, const calib::Misfit& misfit) {
   out.number(misfit.V_length_m);
 }
 
-/// Only if the tracker stood at a named place.
+/// Adds the place of the tracker. It is added only if the place has a name.
 void add_tracker_place(Canonical& out, const calib::TrackerPlace& place) {
   out.text("tracker place");
   out.text(place.name);

@@ -22,9 +22,11 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// Another number whenever ModelSummary or the table changes: the index is then made again.
+/// Increment this number whenever ModelSummary or the table changes: an index with another number
+/// is rebuilt.
 constexpr int kIndexVersion = 1;
-/// Another process holds the file for milliseconds. Who waits longer does without the index.
+/// Longest wait for another process, which holds the file for milliseconds. If the wait is longer,
+/// this process does not use the index.
 constexpr int kBusy_ms = 200;
 
 constexpr auto kTable =
@@ -45,14 +47,14 @@ std::string text_of(const ModelSummary& summary) {
                         {"fault", summary.fault}});
 }
 
-/// Throws json::exception, as summary_from().
+/// Reads a verdict. Throws json::exception, as summary_from().
 std::optional<ModelVerdict> verdict_from(const json& object) {
   if (object.is_null()) return std::nullopt;
   return ModelVerdict{object.at("accepted").get<bool>(),
                       object.at("reasons").get<std::vector<std::string>>()};
 }
 
-/// Throws json::exception if a member is missing or has the wrong type.
+/// Reads a summary. Throws json::exception if a member is missing or has the wrong type.
 ModelSummary summary_from(const std::string& text) {
   const json object = json::parse(text);
   const json& simulated = object.at("simulated");
@@ -64,8 +66,9 @@ ModelSummary summary_from(const std::string& text) {
           .fault = object.at("fault").get<std::string>()};
 }
 
-/// SQLite has no checksums, and a changed bit must not rename a machine. With the version of abbe:
-/// another one may read a file in which this one found a fault.
+/// The checksum of a row. SQLite has no checksums, and a changed bit must not change, for example,
+/// the name of a machine. The version of abbe is included, because another version may be able to
+/// read a file in which this version found a fault.
 std::string checksum(const std::string& id, const StoreStamp& file, const std::string& summary) {
   return sha256_hex(fmt::format("{} {} {} {} {} {}", ABBE_VERSION, id, file.inode, file.modified_ns,
                                 file.bytes, summary));
@@ -81,19 +84,20 @@ bool is_regular_or_missing(const fs::path& file) {
   return type == fs::file_type::regular || type == fs::file_type::not_found;
 }
 
-/// The index if it can be opened and has the tables of this version. Throws SQLite::Exception.
+/// Opens the index; null if it cannot be opened or has tables of another version. Throws
+/// SQLite::Exception.
 std::unique_ptr<SQLite::Database> open_index(const fs::path& file) {
   auto database =
       std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READWRITE, kBusy_ms);
-  // An index that a power failure damages is made again, so that nothing waits for the disk.
+  // The index is not synced to the disk: if a power failure damages it, it is rebuilt.
   database->exec("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF");
   const int version = database->execAndGet("PRAGMA user_version").getInt();
   return version == kIndexVersion ? std::move(database) : nullptr;
 }
 
-/// Throws SQLite::Exception.
+/// Creates a new index. Throws SQLite::Exception.
 std::unique_ptr<SQLite::Database> create_index(const fs::path& file) {
-  // An empty file is an empty database; this one has owner and mode of the store.
+  // An empty file is an empty database. replace_file() gives it owner and mode of the store.
   if (!replace_file(file, "")) return nullptr;
   SQLite::Database created{file.string(), SQLite::OPEN_READWRITE, kBusy_ms};
   SQLite::Transaction change{created};
@@ -121,7 +125,8 @@ void ModelIndex::make_again() {
   if (::access(file_.parent_path().c_str(), W_OK) != 0) return;
   try {
     database_ = create_index(file_);
-  } catch (const SQLite::Exception&) {  // a full disk, or another process creates it now
+  } catch (const SQLite::Exception&) {  // the disk is full, or another process creates the index
+                                        // now
     database_ = nullptr;
   }
 }
@@ -147,12 +152,15 @@ std::unordered_map<std::string, IndexedModel> ModelIndex::rows() {
       std::string id = model.id;
       found.insert_or_assign(std::move(id), std::move(model));
     }
-  } catch (const SQLite::Exception& error) {  // the rows so far have their checksums
+  } catch (const SQLite::Exception& error) {  // the rows read so far are valid, because their
+                                              // checksums were checked
     damaged = is_damage(error);
-  } catch (const json::exception&) {  // a version of abbe with other members and the same number
+  } catch (const json::exception&) {  // another version of abbe wrote other members with the same
+                                      // kIndexVersion
     found.clear();
   }
-  // After the statement, which uses the database. The rows are read from the files again.
+  // The index is rebuilt here because the statement, which uses the database, no longer exists. The
+  // caller reads the rows from the files again.
   if (damaged) {
     found.clear();
     make_again();
@@ -175,7 +183,8 @@ void ModelIndex::put(std::span<const IndexedModel> models) {
       row.reset();
     }
     change.commit();
-  } catch (const SQLite::Exception& error) {  // else read-only, busy or full: read again later
+  } catch (const SQLite::Exception& error) {  // other errors: read-only, busy or full; the models
+                                              // are read again later
     damaged = is_damage(error);
   }
   if (damaged) make_again();
@@ -192,7 +201,7 @@ void ModelIndex::remove(std::span<const std::string> ids) {
       row.reset();
     }
     change.commit();
-  } catch (const SQLite::Exception&) {  // a row without a file is not used
+  } catch (const SQLite::Exception&) {  // a row that remains without its file is not used
   }
 }
 
@@ -207,7 +216,8 @@ ModelSummary summary_of(const ModelDocument& document) {
 
 std::vector<ModelSummary> summaries(const ModelStore& store, const fs::path& folder,
                                     const std::vector<std::string>& ids) {
-  // Reading a model takes some 10 ms: an interrupted rebuild keeps what it has done.
+  // Reading a model takes about 10 ms. The rows are written in parts, so that an interrupted
+  // rebuild keeps the rows written so far.
   constexpr std::size_t kModelsPerWrite = 64;
   ModelIndex index{folder};
   auto known = index.rows();
@@ -224,7 +234,7 @@ std::vector<ModelSummary> summaries(const ModelStore& store, const fs::path& fol
     const auto document = store.load(id);
     found.push_back(document ? summary_of(*document)
                              : ModelSummary{.fault = document.error().text});
-    // What the disk refused now may be readable the next time.
+    // A file with an Io error is not added to the index, because it may be readable the next time.
     if (document || document.error().code != ErrorCode::Io)
       read.push_back({id, file, found.back()});
     if (read.size() == kModelsPerWrite) index.put(std::exchange(read, {}));

@@ -1,9 +1,9 @@
 #pragma once
-/// index.sqlite in the folder of a store: what lists of models need of each model.json, so that a
-/// list does not read all models. It is a cache. A row is used only while its file has the same
-/// inode, time and size and the row has its checksum; a missing or damaged index is made again. A
-/// process that may not write to the folder reads the index and leaves it as it is. No call fails:
-/// without a usable index there are no rows. An object must be used by one thread only.
+/// index.sqlite in the folder of a store: the data of each model.json that lists of models show, so
+/// that a list need not read all models. The index is a cache. A row is used only while its file
+/// has the same inode, time and size and the row has its checksum; a missing or damaged index is
+/// rebuilt. A process that may not write to the folder reads the index and does not change it. No
+/// call fails: without a usable index there are no rows. An object must be used by one thread only.
 
 #include <cstdint>
 #include <filesystem>
@@ -22,19 +22,19 @@ class Database;
 
 namespace abbe::daemon {
 
-/// What lists show of a model, and what retention of recordings needs.
+/// The data of a model that lists show and that the retention of recordings needs.
 struct ModelSummary {
   std::string method{}, machine{};
-  std::vector<std::string> inputs{};      ///< names of the files that the model was made of
-  std::optional<ModelVerdict> verdict{};  ///< of the file: decision and reasons
+  std::vector<std::string> inputs{};      ///< names of the files from which the model was made
+  std::optional<ModelVerdict> verdict{};  ///< verdict in the file: decision and reasons
   std::optional<bool> simulated{};        ///< made_on_simulated_devices()
-  std::string fault{};  ///< why the file is not a model; then all others are empty
+  std::string fault{};  ///< why the file is not a valid model; all other members are then empty
   bool operator==(const ModelSummary&) const = default;
 };
 
 struct IndexedModel {
   std::string id;
-  StoreStamp file;  ///< of model.json when it was read
+  StoreStamp file;  ///< stamp of model.json when it was read
   ModelSummary summary;
 };
 
@@ -49,12 +49,13 @@ class ModelIndex {
 
   /// All rows with a correct checksum, by id; none, and an empty index, if SQLite finds damage.
   [[nodiscard]] std::unordered_map<std::string, IndexedModel> rows();
-  /// Adds rows, or replaces those of the same id. A damaged index is then empty.
+  /// Adds rows, or replaces rows with the same id. If SQLite finds the index damaged, the index is
+  /// emptied.
   void put(std::span<const IndexedModel> models);
   void remove(std::span<const std::string> ids);
 
  private:
-  /// An empty index in place of the present one; none if the folder is not writable.
+  /// Replaces the index by an empty one; without an index if the folder is not writable.
   void make_again();
 
   std::filesystem::path file_;
@@ -66,8 +67,8 @@ class ModelIndex {
 
 [[nodiscard]] ModelSummary summary_of(const ModelDocument& document);
 
-/// The summaries of the models `ids`, in their order. What the index of the store lacks is read and
-/// added to it; rows of other models are removed.
+/// The summaries of the models `ids`, in this order. A summary that the index lacks is read from
+/// the model file and added to the index; rows of other models are removed.
 [[nodiscard]] std::vector<ModelSummary> summaries(const ModelStore& store,
                                                   const std::filesystem::path& folder,
                                                   const std::vector<std::string>& ids);

@@ -19,7 +19,7 @@
 
 namespace abbe::daemon {
 
-/// long double: see decimal.hpp.
+/// Numbers are long double: see decimal.hpp.
 using ModelJson = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t,
                                        std::uint64_t, long double>;
 

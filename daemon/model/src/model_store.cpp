@@ -56,8 +56,8 @@ Result<std::vector<std::string>> ids_on_disk(const fs::path& folder) {
   return ids;
 }
 
-/// The ids on disk, and those of all Added events, because an added model without a file is lost
-/// and must be listed; without the models that were removed.
+/// The ids on disk, and the ids of all Added events: an added model whose file is missing is lost
+/// and must be listed. Models that were removed are not included.
 Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const StoreState& state) {
   auto ids = ids_on_disk(folder);
   if (!ids) return ids;
@@ -72,7 +72,7 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
   return ids;
 }
 
-/// That of the state; where it was lost, that of the file.
+/// The verdict in the state, or the verdict in the file if the state was lost.
 std::optional<ModelVerdict> verdict_on(const StoreState& state, const ModelDocument& document) {
   const StoreEvent* added = state.last_added(model_id(document));
   if (added == nullptr) return document.verdict;
@@ -86,12 +86,12 @@ void set_verdict(StoreEntry& entry, const std::optional<ModelVerdict>& verdict) 
   entry.reasons = verdict->reasons;
 }
 
-/// Notes may differ.
+/// True if decision and reasons are equal; notes may differ.
 bool same_decision(const std::optional<ModelVerdict>& a, const ModelVerdict& b) {
   return a && a->accepted == b.accepted && a->reasons == b.reasons;
 }
 
-/// The document with its own verdict, or with `verdict` if it has another one.
+/// The document with its own verdict, or with `verdict` if the decisions differ.
 ModelDocument with_verdict(ModelDocument document, const ModelVerdict& verdict) {
   if (!same_decision(document.verdict, verdict)) document.verdict = verdict;
   return document;
@@ -99,7 +99,7 @@ ModelDocument with_verdict(ModelDocument document, const ModelVerdict& verdict) 
 
 constexpr std::size_t kShortestPrefix = 4;
 
-/// Why `prefix` does not name one of `candidates`, the ids that begin with it.
+/// The Error that `prefix` does not name one model. `candidates`: the ids that begin with it.
 Error not_found(const std::string& prefix, const std::vector<std::string>& candidates,
                 const fs::path& folder) {
   constexpr std::size_t kMostListed = 10;
@@ -149,8 +149,8 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
                                     std::vector<std::string> reasons, const StoreActor& actor) {
   const auto id = model_id(document);
   // The model file is written first and without the lock. Another process may write the same file,
-  // but with the same model, because the id is a hash of the model. A file of this id that is
-  // damaged, or has another verdict, is replaced.
+  // but with the same model, because the id is a hash of the model. A file with this id is replaced
+  // if it is damaged or has another verdict.
   const ModelVerdict verdict{accepted, reasons};
   const auto write_model_file = [&]() -> Result<void> {
     const ModelDocument judged = with_verdict(document, verdict);
@@ -248,7 +248,7 @@ Result<std::vector<std::string>> ModelStore::remove_old(const ModelRetention& re
     state->events.push_back(StoreEvent{StoreAction::Removed, id, actor, false, {}});
   if (!removed.empty()) ABBE_TRY(replace_file(state_file_, to_text(*state)));
 
-  // Also the files that an earlier call could not remove.
+  // Also tries again to remove files that an earlier call could not remove.
   for (const auto& [id, event] : state->models()) {
     std::error_code error;
     if (event->action != StoreAction::Removed) continue;
@@ -286,7 +286,8 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     entries.push_back(std::move(entry));
   }
 
-  // In the order of the events, not of their dates: the clock may have been set back in between.
+  // Entries are sorted by the order of the events, not by their dates, because the clock may have
+  // been set back in between.
   std::ranges::stable_sort(entries, std::greater<>{}, [&models](const StoreEntry& entry) {
     const auto added = models.find(entry.id);
     return added == models.end() ? nullptr : added->second;

@@ -9,7 +9,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// Spaces for line ends and tabs; a terminal must not take the rest for a command.
+/// The text on one line: spaces for line ends and tabs; other control characters are replaced, so
+/// that a terminal does not execute them.
 std::string one_line(std::string text) {
   std::ranges::replace_if(
       text, [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
@@ -26,16 +27,17 @@ const StoreEvent* drift_of(std::span<const StoreEvent> events) {
   return nullptr;
 }
 
-/// A model that was not judged is not refused: files of earlier versions stay usable, and what is
-/// made of them states that they were not judged. `abbe model activate` does refuse it, because a
-/// store has the verdict of every model that abbe added.
+/// Adds the verdict. A model that was not judged is not refused: files of earlier versions stay
+/// usable, and a file made from such a model states that it was not judged. In contrast, `abbe
+/// model activate` refuses it, because a store has the verdict of every model that abbe added.
 void add_verdict(const ModelInUse& use, Obstacles& out) {
   const auto& verdict = use.document.verdict;
   const std::string text = "verdict: " + in_one_line(verdict);
   (verdict && !verdict->accepted ? out.refusals : out.statements).push_back(text);
 }
 
-/// A person accepted the model of an earlier version for this configuration and no later one.
+/// True if a person accepted the model, made by an earlier version of abbe, for this configuration,
+/// and for no other configuration later.
 bool accepted_for(std::span<const StoreEvent> events, const std::string& machine_hash) {
   const auto last = std::find_if(events.rbegin(), events.rend(), [](const StoreEvent& event) {
     return !event.accepted_configuration.empty();
@@ -43,8 +45,8 @@ bool accepted_for(std::span<const StoreEvent> events, const std::string& machine
   return last != events.rend() && last->accepted_configuration == machine_hash;
 }
 
-/// A certificate is for a machine that exists. A control file of a model of simulated devices may
-/// be for a simulated control; it states where the model comes from.
+/// Adds the obstacle of simulated devices. A certificate is for a machine that exists, so it is
+/// refused. A control file may be for a simulated control; it states the origin of the model.
 void add_simulated(const ModelInUse& use, Obstacles& out) {
   if (!made_on_simulated_devices(use.document).value_or(false)) return;
   auto& list = use.purpose == ModelPurpose::Certificate ? out.refusals : out.statements;
@@ -52,8 +54,8 @@ void add_simulated(const ModelInUse& use, Obstacles& out) {
       "SIMULATED: the model was made on simulated devices and describes no real machine");
 }
 
-/// A model that is no longer that of its machine: an obstacle to a correction, but not to a
-/// certificate of what was measured.
+/// Adds the changes of the machine since the model was made. They are obstacles to a correction,
+/// but not to a certificate of what was measured.
 void add_later_changes(const ModelInUse& use, Obstacles& out) {
   auto& list = use.purpose == ModelPurpose::Control ? out.refusals : out.statements;
   if (const StoreEvent* drift = drift_of(use.events); drift != nullptr)

@@ -6,7 +6,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// The elements of an array; an empty list after a fault.
+/// The elements of an array; empty after a fault.
 std::vector<const ModelJson*> elements_of(ModelReader& in, const ModelJson& object,
                                           const std::string& path, const std::string& key) {
   std::vector<const ModelJson*> elements;

@@ -7,8 +7,8 @@
 
 namespace abbe::daemon {
 
-/// The member `misfit` of model.json; nullopt in models without misfit, which those of earlier
-/// versions are.
+/// The member `misfit` of model.json. nullopt in models without misfit and in models of earlier
+/// versions.
 [[nodiscard]] std::optional<calib::Misfit> read_misfit(ModelReader& in);
 
 }  // namespace abbe::daemon

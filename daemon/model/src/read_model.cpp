@@ -114,7 +114,7 @@ void read_covariance(ModelReader& in, calib::ModelDescription& out) {
 }
 
 void read_datum(ModelReader& in, calib::ModelDescription& out) {
-  // "gauge": the earlier name
+  // earlier versions wrote the key "gauge"
   const std::string key = in.has("gauge") ? "gauge" : "datum";
   const auto text = in.text(key);
   for (const auto datum : {calib::ModelDatum::G1, calib::ModelDatum::G2,
@@ -168,7 +168,7 @@ ModelStatistics read_statistics(ModelReader& in) {
   s.condition = in.number_of(*statistics, path, "condition", 0);
   s.sigma0 = in.number_of(*statistics, path, "sigma0", 0);
   s.chi2_per_dof = in.number_of(*statistics, path, "chi2_per_dof", 0);
-  // "covariance_factor": the earlier name
+  // earlier versions wrote the key "covariance_factor"
   const bool earlier = statistics->is_object() && statistics->contains("covariance_factor");
   s.variance_factor =
       in.number_of(*statistics, path, earlier ? "covariance_factor" : "variance_factor", 0);
@@ -203,13 +203,13 @@ std::optional<calib::Expansion> read_artefact(ModelReader& in) {
       within("u_temperature_K", 0, 0.0, kHighest_K - kLowest_K)};
 }
 
-/// `recording_gap` is absent in models with a complete recording, `mode` in models of other
-/// methods; both are absent in models of earlier versions.
+/// Reads an optional text. `recording_gap` is absent in models with a complete recording, `mode` in
+/// models of other methods; both are absent in models of earlier versions.
 std::string read_optional(ModelReader& in, const std::string& key) {
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
 }
 
-/// Absent in models without reference nests.
+/// Reads the drift of the tracker; nullopt in models without reference nests.
 std::optional<TrackerDriftFigures> read_tracker_drift(ModelReader& in) {
   const std::string path = "tracker_drift";
   if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
@@ -247,7 +247,7 @@ MeaningEntries read_entries(ModelReader& in, const ModelJson& configuration,
   return entries;
 }
 
-/// Absent in models of earlier versions.
+/// Reads the configuration; nullopt in models of earlier versions.
 std::optional<Meaning> read_configuration(ModelReader& in) {
   if (!in.root().is_object() || !in.root().contains("configuration")) return std::nullopt;
   const ModelJson& entry = in.root().at("configuration");
@@ -268,7 +268,7 @@ void check_configuration(ModelReader& in, const ModelDocument& document) {
 Result<ModelDocument> read_document(ModelReader& in) {
   if (in.text("schema") != kModelSchema) {
     in.fault("schema", fmt::format("must be \"{}\"", kModelSchema));
-    // In a file with another schema all further faults would be meaningless, so only this one is
+    // If the file has another schema, further faults would have no meaning; only this one is
     // reported.
     return tl::make_unexpected(in.to_error());
   }

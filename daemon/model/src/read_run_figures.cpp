@@ -39,7 +39,7 @@ std::vector<RunFigures::Interval> read_intervals(ModelReader& in, const ModelJso
   return intervals;
 }
 
-/// Models of earlier versions do not have them.
+/// Reads the places; models of earlier versions do not have them.
 std::vector<std::vector<calib::Vector3>> read_places(ModelReader& in, const ModelJson& run) {
   const std::string path = "run.places_mm";
   std::vector<std::vector<calib::Vector3>> places;
@@ -168,7 +168,7 @@ std::vector<RunFigures::Table> read_tables(ModelReader& in, const ModelJson& run
   return tables;
 }
 
-/// First and last observation.
+/// Reads the dates of the first and last observation.
 std::optional<std::array<protocol::UtcTime, 2>> read_measured(ModelReader& in,
                                                               const ModelJson& list) {
   const std::string path = "run.conditions.measured_utc";

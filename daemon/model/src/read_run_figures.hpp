@@ -7,7 +7,7 @@
 
 namespace abbe::daemon {
 
-/// Absent in models of earlier versions.
+/// Reads the figures of the run; nullopt in models of earlier versions.
 [[nodiscard]] std::optional<RunFigures> read_run_figures(ModelReader& in);
 
 }  // namespace abbe::daemon

@@ -8,8 +8,8 @@
 
 namespace abbe::daemon {
 
-/// The member `tracker_place` of model.json, with one derivative for each of `parameters`; nullopt
-/// in models of runs without a named place, which those of earlier versions are.
+/// The member `tracker_place` of model.json, with one derivative for each of `parameters`. nullopt
+/// in models of runs without a named place, and in models of earlier versions.
 [[nodiscard]] std::optional<calib::TrackerPlace> read_tracker_place(ModelReader& in,
                                                                     std::size_t parameters);
 

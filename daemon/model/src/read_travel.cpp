@@ -37,8 +37,8 @@ std::vector<calib::Backlash> read_differences(ModelReader& in, const ModelJson& 
   return all;
 }
 
-/// Row by row: the covariance of a difference with the n parameters, then with itself and the
-/// differences after it.
+/// Reads the covariance row by row: each row has the covariances of a difference with the n
+/// parameters, with itself, and with the differences after it.
 void read_travel_covariance(ModelReader& in, const ModelJson& travel, Eigen::Index n,
                             calib::TravelDifferences& out) {
   const std::string path = "travel.covariance";

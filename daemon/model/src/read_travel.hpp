@@ -15,12 +15,12 @@ namespace abbe::daemon {
 
 struct StoredTravel {
   calib::TravelDifferences differences;
-  std::vector<calib::Backlash> list;  ///< with names and positions
+  std::vector<calib::Backlash> list;  ///< the differences with names and positions
 };
-/// nullopt in models whose V does not depend on the direction of travel, which those of earlier
-/// versions are. `parameters`: number of parameters of the model.
+/// nullopt in models whose V does not depend on the direction of travel, and in models of earlier
+/// versions. `parameters`: number of parameters of the model.
 [[nodiscard]] std::optional<StoredTravel> read_travel(ModelReader& in, std::size_t parameters);
-/// Adds a fault for the first difference that is not that of the tables.
+/// Adds a fault for the first difference that does not belong to the tables of the model.
 void check_names(ModelReader& in, const StoredTravel& travel, const calib::VolumetricModel& model);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// The lock that serialises changes of several processes to one store.
+/// The lock that orders changes of several processes to one store.
 
 #include <chrono>
 #include <filesystem>

@@ -128,7 +128,8 @@ std::vector<std::string> StoreState::beyond(const ModelRetention& retention,
   std::vector<const StoreEvent*> added;
   for (const auto& [id, event] : models())
     if (event->action == StoreAction::Added) added.push_back(event);
-  std::ranges::sort(added, std::less<>{});  // pointers into `events`: in the order of adding
+  // the pointers point into `events`, so this is the order in which the models were added
+  std::ranges::sort(added, std::less<>{});
   if (added.size() <= retention.keep_newest) return {};
   added.resize(added.size() - retention.keep_newest);
 

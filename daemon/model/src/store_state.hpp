@@ -17,14 +17,14 @@ struct StoreState {
   /// The ids of all activations that were not rolled back, oldest first; the last one is active.
   [[nodiscard]] std::vector<std::string> activations() const;
   [[nodiscard]] std::optional<std::string> active() const;
-  /// The event that made the active model active; `accepted` and `reasons` are the verdict of the
-  /// gate when the model was added, `accepted_configuration` the last one of the model.
+  /// The event that made the active model active. Its `accepted` and `reasons` are the verdict of
+  /// the gate when the model was added, its `accepted_configuration` is the last one of the model.
   [[nodiscard]] std::optional<StoreEvent> activation() const;
   /// Reason of the last Drifted event since the last activation; empty: there is none.
   [[nodiscard]] std::string drift() const;
   /// null if the model was never added, or was removed since
   [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;
-  /// By id the last Added or Removed event of each model; the pointers are into `events`.
+  /// The last Added or Removed event of each model, by id. The pointers point into `events`.
   [[nodiscard]] std::unordered_map<std::string_view, const StoreEvent*> models() const;
   /// The ids that ModelStore::remove_old() removes, oldest first.
   [[nodiscard]] std::vector<std::string> beyond(const ModelRetention& retention,

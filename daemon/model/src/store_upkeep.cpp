@@ -48,7 +48,8 @@ bool is_gone(pid_t process) noexcept {
   return process == ::getpid() || (::kill(process, 0) != 0 && errno == ESRCH);
 }
 
-/// "2024-05-17T08-30-00Z": without colons, which some file systems do not allow.
+/// The date for a file name: "2024-05-17T08-30-00Z". It has no colons, which some file systems do
+/// not allow.
 std::string date_for_name(protocol::UtcTime now) {
   constexpr std::size_t kSeconds = 19;
   std::string date = to_text(now).substr(0, kSeconds) + "Z";
@@ -83,7 +84,7 @@ Result<void> ModelStore::rename_damaged_state(protocol::UtcTime now) {
   if (!is_damaged(state_file_)) return {};
   const auto lock = lock_store(folder_, lock_patience_);
   ABBE_TRY(lock);
-  if (!is_damaged(state_file_)) return {};  // another process repaired it
+  if (!is_damaged(state_file_)) return {};  // another process has repaired it
   const auto renamed = folder_ / (std::string{kDamaged} + date_for_name(now));
   if (::renameat2(AT_FDCWD, state_file_.c_str(), AT_FDCWD, renamed.c_str(), RENAME_NOREPLACE) == 0)
     return {};

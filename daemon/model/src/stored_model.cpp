@@ -7,7 +7,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// Adds what the events say to the verdict of the file.
+/// Adds the verdict of the events to the verdict of the file.
 void add_events(std::optional<ModelVerdict>& verdict, const std::vector<StoreEvent>& events) {
   std::optional<StoreActor> forced;
   for (const StoreEvent& event : events) {
@@ -36,7 +36,7 @@ StoreEntry entry_of(const ModelDocument& document, const std::vector<StoreEvent>
 
 }  // namespace
 
-// ModelStore::list() would read every model of the store.
+// ModelStore::list() is not used, because it would read every model of the store.
 Result<StoredModel> stored_model(const ModelStore& store, const std::string& id) {
   auto document = store.load(id);
   ABBE_TRY(document);

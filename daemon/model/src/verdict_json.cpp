@@ -26,15 +26,16 @@ std::string forced_of(const StoreActor& actor) {
                      quoted_json(to_text(actor.when)));
 }
 
-/// Everything of the verdict apart from the checksum.
+/// The text of all members of the verdict except the checksum.
 std::string members_of(const ModelVerdict& verdict) {
   return fmt::format("\"state\": {},\n    \"reasons\": {},\n    \"notes\": {}{}",
                      quoted_json(name(state_of(verdict))), strings_of(verdict.reasons),
                      strings_of(verdict.notes), verdict.forced ? forced_of(*verdict.forced) : "");
 }
 
-/// With the id of the model, so that no verdict on another model fits. Texts that are read again
-/// have the same members, because invalid UTF-8 was replaced before.
+/// The checksum of the verdict. It includes the id of the model, so that a verdict on another model
+/// does not match. Texts that are read again give the same checksum, because invalid UTF-8 was
+/// replaced before.
 std::string checksum_of(const ModelDocument& document) {
   return sha256_hex(model_id(document) + "\n" + members_of(*document.verdict));
 }

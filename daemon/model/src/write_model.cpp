@@ -105,8 +105,8 @@ void write_backlash(JsonText& out, std::span<const calib::Backlash> backlash) {
   out.raw(differences(backlash, "  "));
 }
 
-/// Covariance, row by row: of a difference with the parameters, with itself and with the
-/// differences after it.
+/// Writes the covariance row by row: covariances of a difference with the parameters, with itself
+/// and with the differences after it.
 void write_travel(JsonText& out, const calib::VolumetricModel& model) {
   const calib::TravelDifferences& d = *model.travel();
   out.key("travel");
@@ -260,8 +260,8 @@ std::string conditions_of(const RunFigures::Conditions& c) {
   return fmt::format(",\n    \"conditions\": {{{}}}", all);
 }
 
-/// The members of "run" that models of earlier versions do not have. One without content is left
-/// out, so that the text of such a model stays as it was.
+/// The members of "run" that models of earlier versions do not have. A member without content is
+/// left out, so that the text of such a model does not change.
 std::string further_figures(const RunFigures& run) {
   std::string all;
   if (!run.parts.empty()) all += parts_of(run);

@@ -1,6 +1,6 @@
-// abbe-mtconnect: an MTConnect adapter. It asks abbed over the control socket and sends SHDR to
-// agents (cppagent). It is a separate process without privileges, so that no packet from the
-// network can stop abbed.
+// abbe-mtconnect: an MTConnect adapter. It requests the status of abbed over the control socket and
+// sends SHDR lines to agents (cppagent). It is a separate process without privileges, so that no
+// packet from the network can stop abbed.
 #include <signal.h>
 
 #include <fmt/format.h>
@@ -39,7 +39,7 @@ using abbe::mtconnect::ShdrServer;
 
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kInternal = number(ExitCode::Internal);
-// Longest time between two looks at signals, watchdog and heartbeats.
+// Longest time between two checks of signals, watchdog and heartbeats.
 constexpr auto kCycle = 100ms;
 
 volatile sig_atomic_t stop_requested = 0;
@@ -73,12 +73,12 @@ void stop_on_signals() {
 /// The state of abbed, for its agents and for the log.
 class Adapter {
  public:
-  /// What a client receives first.
+  /// The lines that a client receives first.
   [[nodiscard]] std::string greeting() const {
     return "* adapterVersion: " ABBE_VERSION "\n" + feed_.everything(utc_now());
   }
 
-  /// Lines with what changed.
+  /// The lines with the values that changed.
   [[nodiscard]] std::string take(const DaemonPoll::Answer& answer) {
     if (!answer) return away(answer.error().text);
     try {
@@ -99,7 +99,7 @@ class Adapter {
   }
 
   ShdrFeed feed_;
-  std::optional<bool> answers_;  ///< nullopt: not asked yet
+  std::optional<bool> answers_;  ///< nullopt: abbed was not asked yet
 };
 
 void serve(ShdrServer& server, Adapter& adapter, DaemonPoll& poll) {

@@ -18,7 +18,7 @@ constexpr std::array kEvents{"avail",       "process_state", "process_id", "proc
                              "u_volume",    "u_type",        "simulated"};
 constexpr std::array kConditions{"devices", "system", "calibration"};
 
-/// The state of a calibration as PROCESS_STATE.
+/// The state of a calibration as a value of the MTConnect data item PROCESS_STATE.
 std::string process_state(const std::string& session_state) {
   static const std::map<std::string, std::string> kStates{
       {"idle", "READY"},         {"warming", "INITIALIZING"}, {"acquiring", "ACTIVE"},

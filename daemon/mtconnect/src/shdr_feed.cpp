@@ -20,13 +20,13 @@ std::string head_of(const std::string& name, protocol::UtcTime now) {
   return fmt::format("{}|{}", shdr_time(now), name);
 }
 
-/// time|name|level|native code|native severity|qualifier|text
+/// A line of a condition: time|name|level|native code|native severity|qualifier|text.
 std::string condition_line(std::string_view head, std::string_view level, std::string_view code,
                            std::string_view text) {
   return fmt::format("{}|{}|{}|||{}\n", head, level, shdr_code(code), shdr_field(text));
 }
 
-/// The lines of a value, whatever was sent before.
+/// The lines of a whole value, independent of what was sent before.
 struct WholeValue {
   std::string_view head;
 
@@ -47,7 +47,8 @@ struct WholeValue {
   }
 };
 
-/// Ends what is no longer raised, then raises what is new or different.
+/// Lines that first end the conditions that are no longer raised, then raise those that are new or
+/// different.
 std::string condition_changes(std::string_view head, const Condition& before,
                               const Condition& after) {
   std::string lines;
@@ -68,7 +69,7 @@ const Condition* raised_in(const Value& value) {
   return condition != nullptr && *condition && !(*condition)->empty() ? &**condition : nullptr;
 }
 
-/// The lines that tell a client which knows `before` what `after` is.
+/// The lines that change the value from `before` to `after` at a client.
 std::string changes(const std::string& name, const Value& before, const Value& after,
                     protocol::UtcTime now) {
   if (before == after) return {};
@@ -103,7 +104,7 @@ void ShdrFeed::keep_recent_texts(const std::string& name, const Value& sent, Val
     const auto old = before != nullptr ? before->find(code) : Condition::const_iterator{};
     const bool stays =
         before != nullptr && old != before->end() && old->second.level == raised.level;
-    // A clock that was set back must not hold the text back.
+    // If the clock was set back, the text must not be held back.
     const bool recent = now >= text_sent && now - text_sent < kTextPeriod;
     if (stays && old->second.text != raised.text && recent) raised.text = old->second.text;
     if (!stays || old->second.text != raised.text) text_sent = now;

@@ -8,7 +8,8 @@
 namespace abbe::mtconnect {
 namespace {
 
-/// Bytes of the UTF-8 character at the beginning of `text`; 0: it is malformed [RFC 3629, 4].
+/// Number of bytes of the UTF-8 character at the beginning of `text`; 0: it is malformed [RFC 3629,
+/// 4].
 std::size_t utf8_length(std::string_view text) {
   const auto byte = [text](std::size_t i) {
     return i < text.size() ? static_cast<std::uint8_t>(text[i]) : std::uint8_t{0};
@@ -29,8 +30,8 @@ std::size_t utf8_length(std::string_view text) {
   return continues(1) && continues(2) && continues(3) && !overlong && !beyond ? 4 : 0;
 }
 
-// Where this stands in a line, an agent keeps it and all lines that follow, until one repeats what
-// begins here: a document in several lines [cppagent, README, "Assets"].
+// If a line contains this word, an agent keeps this line and all following lines until the text
+// that begins here is repeated: a document in several lines [cppagent, README, "Assets"].
 constexpr std::string_view kMultiline = "--multiline--";
 
 bool is_control(char c) {
@@ -55,7 +56,8 @@ std::string printable(std::string_view text) {
   return out;
 }
 
-/// The agent removes spaces at both ends; the first character decides whether a field is quoted.
+/// The text without spaces at both ends, which the agent would remove. The first remaining
+/// character decides whether a field is quoted.
 std::string without_outer_spaces(const std::string& text) {
   const auto first = text.find_first_not_of(' ');
   if (first == std::string::npos) return {};
@@ -86,7 +88,8 @@ std::string shdr_code(std::string_view code) {
 }
 
 std::string shdr_time(protocol::UtcTime time) {
-  constexpr std::size_t kNanosecondDigits = 3;  // of "...123456789Z", after the microseconds
+  // number of digits of "...123456789Z" after the microseconds
+  constexpr std::size_t kNanosecondDigits = 3;
   std::string text = daemon::to_text(time);
   text.erase(text.size() - 1 - kNanosecondDigits, kNanosecondDigits);
   return text;

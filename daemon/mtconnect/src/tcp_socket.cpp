@@ -19,7 +19,7 @@ using daemon::ErrorCode;
 using daemon::FileDescriptor;
 
 constexpr int kBacklog = 16;
-// A peer that is gone is found after 30 + 3 x 10 s.
+// Keep-alive detects a lost peer after 30 + 3 x 10 s.
 constexpr int kKeepIdle_s = 30, kKeepInterval_s = 10, kKeepCount = 3;
 
 using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
@@ -72,7 +72,8 @@ daemon::Result<FileDescriptor> listen_tcp(const std::string& address, std::uint1
   FileDescriptor fd{
       ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, IPPROTO_TCP)};
   if (!fd) return refused(address, port);
-  set(fd.get(), SOL_SOCKET, SO_REUSEADDR, 1);  // after a restart, old connections hold the port
+  // allows listening after a restart, while old connections still occupy the port
+  set(fd.get(), SOL_SOCKET, SO_REUSEADDR, 1);
   if (::bind(fd.get(), found->ai_addr, found->ai_addrlen) != 0 || ::listen(fd.get(), kBacklog) != 0)
     return refused(address, port);
   return fd;

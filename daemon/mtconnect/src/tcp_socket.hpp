@@ -16,11 +16,11 @@ namespace abbe::mtconnect {
 [[nodiscard]] std::uint16_t local_port(int fd);
 
 struct Accepted {
-  daemon::FileDescriptor fd;  ///< empty: errno holds the cause
+  daemon::FileDescriptor fd;  ///< empty: errno states the cause
   std::string peer;           ///< "127.0.0.1:40312", "[::1]:40312"
 };
-/// The next connection. The kernel finds a peer that is gone without closing it (keep-alive), and
-/// keeps at most `send_buffer_bytes` for it.
+/// The next connection. The kernel detects a peer that disappeared without closing the connection
+/// (keep-alive), and buffers at most `send_buffer_bytes` for it.
 [[nodiscard]] Accepted accept_tcp(int listener, int send_buffer_bytes);
 
 }  // namespace abbe::mtconnect

@@ -1,5 +1,6 @@
-// abbe-notify: webhooks and mails when the state of abbed changes. It asks abbed over the control
-// socket. It is a separate process without privileges, so that no receiver can stop abbed.
+// abbe-notify: sends webhooks and mails when the state of abbed changes. It requests the status of
+// abbed over the control socket. It is a separate process without privileges, so that no receiver
+// can stop abbed.
 #include <poll.h>
 #include <signal.h>
 
@@ -51,9 +52,9 @@ using Deliveries = std::vector<std::unique_ptr<Delivery>>;
 
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kIo = number(ExitCode::Io), kInternal = number(ExitCode::Internal);
-// Longest time between two looks at signals, watchdog and what is held back.
+// Longest time between two checks of signals, watchdog and notifications that are held back.
 constexpr auto kCycle = 100ms;
-// An abbed that hangs delays the end by the time-out of its request.
+// If abbed does not answer, the time-out of the request delays the end.
 constexpr auto kLongestEnd = 1500ms;
 
 volatile sig_atomic_t stop_requested = 0;
@@ -84,7 +85,7 @@ void stop_on_signals() {
   for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
 }
 
-/// Sends one message over every configured way and reports what became of it.
+/// Sends one message to every configured receiver and prints the results.
 int test_all(const NotifySettings& settings, const std::vector<Receiver>& receivers) {
   const auto message = abbe::notify::test_notification(settings.machine, utc_now());
   bool all_accepted = true;
@@ -100,7 +101,7 @@ int test_all(const NotifySettings& settings, const std::vector<Receiver>& receiv
   return all_accepted ? kDone : kIo;
 }
 
-/// Logs when abbed begins and stops to answer.
+/// Logs when abbed begins and stops answering.
 class AnswerLog {
  public:
   void see(const DaemonPoll::Answer& answer) {
@@ -110,10 +111,11 @@ class AnswerLog {
   }
 
  private:
-  std::optional<bool> answers_;  ///< nullopt: not asked yet
+  std::optional<bool> answers_;  ///< nullopt: abbed was not asked yet
 };
 
-/// Returns after a signal, with `deadline` set: the end may then last kLongestEnd.
+/// Follows the state of abbed until a signal arrives. `deadline` is then set: the end may take
+/// kLongestEnd.
 void follow(const NotifySettings& settings, Deliveries& deliveries,
             std::optional<ExitDeadline>& deadline) {
   StateChanges changes(settings.notify.settle);

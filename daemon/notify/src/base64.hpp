@@ -5,7 +5,7 @@
 
 namespace abbe::notify {
 
-/// Base64 [RFC 4648, 4] without line ends.
+/// The bytes in Base64 [RFC 4648, 4], without line ends.
 [[nodiscard]] std::string base64(std::string_view bytes);
 
 }  // namespace abbe::notify

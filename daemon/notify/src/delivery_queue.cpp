@@ -21,7 +21,7 @@ std::optional<DeliveryQueue::Attempt> DeliveryQueue::take(Time now) {
 }
 
 void DeliveryQueue::accepted() {
-  lost_ -= in_transit_->not_delivered;  // those lost meanwhile are not reported yet
+  lost_ -= in_transit_->not_delivered;  // notifications lost since take() are not reported yet
   in_transit_.reset();
   pause_ = {};
 }
@@ -34,7 +34,7 @@ void DeliveryQueue::refused() {
 
 std::chrono::milliseconds DeliveryQueue::failed(Time now) {
   if (waiting_.size() >= most_waiting_)
-    ++lost_;  // it is the oldest
+    ++lost_;  // the notification that failed is the oldest and is dropped
   else
     waiting_.push_front(std::move(in_transit_->notification));
   in_transit_.reset();

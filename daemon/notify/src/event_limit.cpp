@@ -43,7 +43,8 @@ Notification EventLimit::notification_of(const Held& held) {
   for (const Event& event : held.events) {
     out.text += (out.text.empty() ? "" : "; ") + event.text;
     out.subjects.push_back(event.subject);
-    // One device that is lost outweighs another one that is back.
+    // If a notification contains both a lost device and one that has returned, it has the phase of
+    // the lost one.
     if (event.severity > out.severity || out.phase == Phase::Ends) out.phase = event.phase;
     out.severity = std::max(out.severity, event.severity);
   }

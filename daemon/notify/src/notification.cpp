@@ -28,7 +28,7 @@ bool continues_character(char c) {
   return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
 }
 
-/// At most `most` bytes, cut between two characters of UTF-8.
+/// The beginning of `text`, at most `most` bytes, cut between two characters of UTF-8.
 std::string_view shortened(std::string_view text, std::size_t most) {
   if (text.size() <= most) return text;
   std::size_t end = most;
@@ -36,7 +36,7 @@ std::string_view shortened(std::string_view text, std::size_t most) {
   return text.substr(0, end);
 }
 
-/// One line: control characters become spaces.
+/// The text on one line: control characters become spaces.
 std::string one_line(std::string_view text, std::size_t most) {
   std::string out{shortened(text, most)};
   std::ranges::replace_if(
@@ -56,7 +56,8 @@ std::string lost_text(std::uint64_t not_delivered) {
                             : fmt::format("{} notifications were not delivered", not_delivered);
 }
 
-/// "Fri, 17 May 2024 08:30:00 +0000" [RFC 5322, 3.3]; strftime() would use the words of a locale.
+/// The date as in [RFC 5322, 3.3]: "Fri, 17 May 2024 08:30:00 +0000". strftime() is not used,
+/// because it would use the words of a locale.
 std::string mail_date(protocol::UtcTime time) {
   constexpr std::array kDays{"Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"};
   constexpr std::array kMonths{"Jan", "Feb", "Mar", "Apr", "May", "Jun",
@@ -89,7 +90,7 @@ std::string body_text(const Notification& n, std::uint64_t not_delivered) {
   return out;
 }
 
-/// Base64 in lines of 76 characters.
+/// The text as Base64, in lines of 76 characters.
 std::string base64_lines(std::string_view text) {
   constexpr std::size_t kWidth = 76;
   const std::string digits = base64(text);
@@ -136,8 +137,8 @@ std::string json_of(const Notification& n, std::uint64_t not_delivered) {
 
 std::string header_text(std::string_view text) {
   constexpr std::size_t kLongestPlain = 60;
-  // 45 bytes are 60 digits; with "=?UTF-8?B?" and "?=" 72 characters. Lines have 76 at most: the
-  // first one has the name of the header, too.
+  // 45 bytes give 60 Base64 digits; with "=?UTF-8?B?" and "?=" these are 72 characters. Lines have
+  // at most 76 characters. The first line also contains the name of the header.
   constexpr std::size_t kBytesOfFirstWord = 36, kBytesOfWord = 45;
   const std::string line = one_line(text, kLongestSubject);
   const bool is_plain = line.size() <= kLongestPlain && line.find("=?") == line.npos &&
@@ -148,7 +149,7 @@ std::string header_text(std::string_view text) {
   for (std::string_view rest = line; !rest.empty();) {
     const std::size_t most = out.empty() ? kBytesOfFirstWord : kBytesOfWord;
     std::string_view word = shortened(rest, most);
-    if (word.empty()) word = rest.substr(0, most);  // not UTF-8
+    if (word.empty()) word = rest.substr(0, most);  // the text is not UTF-8: cut at any byte
     out += fmt::format("{}=?UTF-8?B?{}?=", out.empty() ? "" : "\r\n ", base64(word));
     rest.remove_prefix(word.size());
   }

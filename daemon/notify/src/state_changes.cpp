@@ -23,7 +23,8 @@ Severity severity_of(Level level) {
   return level == Level::Fault ? Severity::Fault : Severity::Warning;
 }
 
-/// Accepted or refused. A calibration that a person cancelled is neither.
+/// True if the calibration was accepted or refused. A calibration that a person cancelled has no
+/// verdict.
 bool has_verdict(const json& session) {
   const auto state = session.at("state").get<std::string>();
   if (state == "active") return true;
@@ -45,7 +46,8 @@ std::map<std::uint64_t, json> ended_sessions(const json& status) {
   return out;
 }
 
-/// "Calibration refused: REASON", as on the page. Most reasons begin with the same word.
+/// The text of a verdict as on the page: "Calibration refused: REASON". The word is not repeated if
+/// the reason begins with it, as most reasons do.
 std::string text_of_verdict(std::string_view word, const std::string& reason) {
   return reason.starts_with(word) ? fmt::format("Calibration {}", reason)
                                   : fmt::format("Calibration {}: {}", word, reason);
@@ -63,16 +65,16 @@ Event event_of_verdict(const json& session) {
           .session = number};
 }
 
-/// What a calibration asks of the person at the machine.
+/// An action that a calibration requests of the person at the machine.
 struct Demand {
   NotifyKind kind = NotifyKind::PersonNeeded;
   Severity severity = Severity::Info;
-  std::string key{};  ///< another key is another demand
+  std::string key{};  ///< a different key means a different request
   std::string text{};
 };
 
-/// The position of an array or the measurement of a bar: its balls and features are not reported
-/// one by one, because the person who touches them is at the machine.
+/// The present position of an array, or the present measurement of a bar. Its balls and features
+/// are not reported one by one, because the person who touches them is at the machine.
 std::string place_of(const json& next) {
   if (next.contains("measurement")) return next.at("measurement").get<std::string>();
   return fmt::format("{}", next.at("position").get<std::int64_t>());
@@ -94,14 +96,14 @@ std::optional<Demand> demand_of(const json& session) {
   return std::nullopt;
 }
 
-/// "model 886b7a59495fc140: STALE: no axis positions yet"
+/// The text of a model's state: "model 886b7a59495fc140: STALE: no axis positions yet".
 std::string text_of_model(const json& model) {
   const auto id = model.value("id", std::string{});
   return fmt::format("{}: {}: {}", id.empty() ? "active model" : "model " + id,
                      model.at("state").get<std::string>(), model.at("reason").get<std::string>());
 }
 
-/// How a state ended: "tracker: streaming".
+/// The text of the end of a state: "tracker: streaming".
 std::string text_of_end(const std::string& subject, const json& status) {
   if (subject == kModelSubject) return text_of_model(status.at("model"));
   for (const json& stream : status.at("streams"))
@@ -150,7 +152,7 @@ std::vector<Event> StateChanges::away(const std::string& fault, Moment now) {
            .time = now.utc}};
 }
 
-/// abbed answers: again, or another process of it.
+/// Evaluates which process answered: abbed answers again, or another process of it answers.
 void StateChanges::see_process(const json& status, Moment now, std::vector<Event>& out) {
   const int process = status.at("process").get<int>();
   const bool restarted = process_ && *process_ != process;
@@ -170,7 +172,7 @@ void StateChanges::see_process(const json& status, Moment now, std::vector<Event
   if (process_ == process) return;
   process_ = process;
   settled_at_ = now.steady + settle_;
-  last_session_ = 0;  // abbed counts calibrations from its start
+  last_session_ = 0;  // abbed counts calibrations anew after each start
   demand_.clear();
 }
 

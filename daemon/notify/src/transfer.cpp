@@ -41,7 +41,7 @@ void append(List& list, const std::string& line) {
   }
 }
 
-/// What is sent and received in one attempt; libcurl keeps pointers to its members.
+/// The data sent and received in one attempt; libcurl keeps pointers to its members.
 struct Exchange {
   std::string out;
   std::size_t sent = 0;
@@ -137,7 +137,7 @@ std::string shown(const std::string& answer) {
   return text.empty() ? "" : fmt::format(": {}", text);
 }
 
-/// What libcurl saw; its own text names host, certificate or time.
+/// The fault that libcurl reports; its own text names host, certificate or time.
 std::string text_of_fault(CURLcode code, const Exchange& exchange) {
   const std::string_view detail{exchange.fault.data()};
   return protocol::printable_line(detail.empty() ? ::curl_easy_strerror(code) : detail);
@@ -148,7 +148,7 @@ TransferOutcome http_outcome(CURL* easy, CURLcode code, const Exchange& exchange
   const bool answered = code == CURLE_OK || (exchange.answer_too_long && http > 0);
   if (!answered) return {Kind::Failed, text_of_fault(code, exchange)};
 
-  // RFC 9110, 15: 2xx success, 3xx redirection, 4xx error of the client.
+  // RFC 9110, 15: 2xx is success, 3xx redirection, 4xx an error of the client.
   if (http >= 200 && http < 300) return {Kind::Accepted, fmt::format("HTTP {}", http)};
   if (http >= 300 && http < 400)
     return {Kind::Refused, fmt::format("HTTP {}: a redirect is not followed; enter the address of "
@@ -163,7 +163,7 @@ TransferOutcome http_outcome(CURL* easy, CURLcode code, const Exchange& exchange
 TransferOutcome mail_outcome(CURL* easy, CURLcode code, const Exchange& exchange) {
   const long smtp = response_code(easy);
   if (code == CURLE_OK) return {Kind::Accepted, fmt::format("SMTP {}", smtp)};
-  // RFC 5321, 4.2.1: 5xx is permanent, 4xx transient.
+  // RFC 5321, 4.2.1: a 5xx reply is permanent, a 4xx reply transient.
   const bool for_good = smtp >= 500 && smtp < 600;
   return {for_good ? Kind::Refused : Kind::Failed,
           fmt::format("{}{}", text_of_fault(code, exchange),
@@ -182,7 +182,7 @@ struct Transfer::Multi {
   Multi& operator=(const Multi&) = delete;
   ~Multi() { ::curl_multi_cleanup(handle); }
 
-  /// The result of libcurl; nullopt: stopped.
+  /// The result of libcurl; nullopt: stop() was called.
   std::optional<CURLcode> run(CURL* easy, const std::atomic<bool>& stopping) const {
     constexpr int kLongestWait_ms = 1000;
     ::curl_multi_add_handle(handle, easy);
@@ -212,7 +212,7 @@ void Transfer::stop() {
 
 TransferOutcome Transfer::send(const Receiver& receiver, const Notification& notification,
                                std::uint64_t not_delivered) {
-  Exchange exchange;  // first, because the end of `easy` may use it
+  Exchange exchange;  // declared first, because the destruction of `easy` may use it
   const Easy easy{::curl_easy_init(), &::curl_easy_cleanup};
   if (!easy || multi_->handle == nullptr) return {Kind::Failed, "libcurl cannot be used"};
 

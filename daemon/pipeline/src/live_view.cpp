@@ -124,8 +124,8 @@ bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
   return mark_axes_missing(now) || forgotten;
 }
 
-/// Marks all axes missing once no axis sample has come for too long. Their last positions stay in
-/// the view; missing_mask shows that they are not current.
+/// Marks all axes missing if no axis sample has come for too long. Their last positions stay in the
+/// view, but missing_mask shows that they are not current.
 bool LiveView::mark_axes_missing(protocol::HostTime now) {
   if (!previous_ || now - previous_->head.time <= axes_patience_) return false;
   const auto all = static_cast<std::uint8_t>((1u << view_.axis_count) - 1u);

@@ -12,7 +12,7 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 
 // Axis samples of the counting card are kept for this time, because the mark crossings of the other
-// card arrive late.
+// card arrive later.
 constexpr auto kMemory = std::chrono::seconds{2};
 // Largest spread of the zero as determined from the single marks, in signal periods. With a larger
 // spread the scale signals are taken to be faulty, and no zero is given.

@@ -17,8 +17,8 @@ using protocol::EnvironmentMask;
 using protocol::EnvironmentSample;
 using std::chrono::nanoseconds;
 
-/// Largest time between the readings of twins that are compared: two devices with slow periods. A
-/// machine changes by 0.3 K meanwhile at most.
+/// Largest time between two readings of twins that are compared, for two devices with slow periods.
+/// The temperature of a machine changes by at most 0.3 K in this time.
 constexpr std::chrono::minutes kComparableFor{1};
 
 nanoseconds since_epoch(protocol::HostTime t) {
@@ -41,8 +41,8 @@ SensorChecks::Sensor* SensorChecks::at_place(std::size_t place) {
   return found == sensors_.end() ? nullptr : &*found;
 }
 
-/// Keeps the reading and what was expected when the doubt began, so that texts do not change while
-/// it lasts.
+/// Stores the reading and the expected range at the time when the doubt began, so that texts do not
+/// change while the doubt lasts.
 void SensorChecks::note(Sensor& sensor, SensorDoubt doubt, double reading, double lowest,
                         double highest) {
   if (sensor.doubt == doubt && doubt != SensorDoubt::Unconfirmed) return;
@@ -58,8 +58,8 @@ void SensorChecks::note(Sensor& sensor, SensorDoubt doubt, double reading, doubl
 }
 
 /// Compares the first reading with the other scales and the air, and with the last value before a
-/// gap. A reading that is too far away
-/// leaves the sensor without a history, so that the next one that agrees is compared again.
+/// gap. A reading that is too far away leaves the sensor without a history, so that the next
+/// reading is compared again.
 void SensorChecks::compare_with_others(Sensor& sensor, double reading,
                                        calib::CheckedReading& verdict) {
   std::vector<double> others;
@@ -81,12 +81,14 @@ void SensorChecks::judge_alone(Sensor& sensor, double reading) {
     compare_with_others(sensor, reading, verdict);
   if (verdict.usable()) sensor.accepted = false;
   sensor.usable = verdict.usable() ? reading : kNone;
-  if (verdict.usable() && sensor.doubt == SensorDoubt::Twin) return;  // judged by judge_by_twin()
+  // judge_by_twin() decides then
+  if (verdict.usable() && sensor.doubt == SensorDoubt::Twin) return;
   note(sensor, verdict.doubt, reading, verdict.lowest, verdict.highest);
 }
 
-/// Both sensors of a pair are in doubt while they differ: nothing shows which one is wrong. Only a
-/// comparison that agrees ends the doubt, not the silence of one of them.
+/// Compares the two sensors of a pair. While they differ, both are in doubt, because it is not
+/// known which one is wrong. The doubt ends only when a comparison agrees, not when one of them
+/// sends nothing.
 void SensorChecks::judge_by_twin(Sensor& sensor) {
   Sensor* const twin = sensor.options.twin ? at_place(*sensor.options.twin) : nullptr;
   if (twin == nullptr) return;
@@ -94,11 +96,12 @@ void SensorChecks::judge_by_twin(Sensor& sensor) {
   const double most = sensor.options.most_twin_difference;
   const bool both = std::isfinite(sensor.usable) && std::isfinite(twin->usable) &&
                     comparable(sensor.at, twin->at);
-  // Until both are in use one comparison is enough: nothing wrong must be used first.
+  // Until both sensors are in use, one comparison that differs is enough for a doubt, so that no
+  // wrong value is used first.
   const bool in_use = std::isfinite(sensor.held.value) && std::isfinite(twin->held.value);
   const int confirmed = in_use ? 2 : 1;
 
-  // In one sample the pair is compared once.
+  // The pair is compared only once per sample.
   const bool compared = sensor.at == twin->at && &sensor != &first;
   if (both && !compared) {
     (void)calib::twins_differ(first.twin_differs, sensor.usable, twin->usable, most);
@@ -108,7 +111,7 @@ void SensorChecks::judge_by_twin(Sensor& sensor) {
   }
 
   for (auto [one, other] : {std::pair{&sensor, twin}, std::pair{twin, &sensor}}) {
-    if (!std::isfinite(one->usable)) continue;  // in doubt for another reason
+    if (!std::isfinite(one->usable)) continue;  // the sensor is in doubt for another reason
     if (first.twins_doubted) {
       note(*one, SensorDoubt::Twin, one->usable, other->usable - most, other->usable + most);
     } else if (one->doubt == SensorDoubt::Twin) {
@@ -117,14 +120,14 @@ void SensorChecks::judge_by_twin(Sensor& sensor) {
   }
 }
 
-/// The value that is used, and where the applied value is now.
+/// Sets the value that is used, and the present applied value.
 void SensorChecks::use(Sensor& sensor) {
   const double before = sensor.used;
   const auto usable =
       sensor.doubt == SensorDoubt::None ? std::optional{sensor.usable} : std::nullopt;
   const double applied =
       calib::followed_value(sensor.applied, before, sensor.at, sensor.options.correction_per_s);
-  // A device that reports that it has no value is believed at once.
+  // If a device reports that it has no value, the last value is not held.
   const auto hold = sensor.doubt == SensorDoubt::NoValue ? nanoseconds{0} : sensor.options.hold;
   sensor.used = calib::held_value(sensor.held, usable, sensor.at, hold);
   sensor.applied = {std::isnan(before) ? sensor.used : applied, sensor.at};

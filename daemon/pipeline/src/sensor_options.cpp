@@ -13,15 +13,15 @@ using protocol::EnvironmentMask;
 
 constexpr double kPerMinute = 1.0 / 60.0;
 constexpr double kPascalsPerHectopascal = 100.0;
-/// Readings of a slow device for which a history lasts.
+/// A history lasts for this number of periods of a slow device.
 constexpr int kReadingsRemembered = 5;
 
 constexpr double celsius(double value_C) {
   return value_C + kZeroCelsius_K;
 }
 
-/// A scale, or an artefact, on a machine in a hall: a part of metal of some kilograms. It warms up
-/// by 5 to 20 K/h, and by 1 K/min under a flood of coolant.
+/// Limits for a scale or an artefact on a machine in a hall: a metal part of some kilograms. It
+/// warms up by 5 to 20 K/h, and by 1 K/min under a flood of coolant.
 SensorLimits scale_limits() {
   return {.lowest = celsius(0.0),
           .highest = celsius(50.0),
@@ -30,7 +30,7 @@ SensorLimits scale_limits() {
           .celsius_power_on_values = true};
 }
 
-/// Air in a hall: 3 K/min when a door is opened in winter.
+/// Limits for air in a hall, which changes by 3 K/min when a door is opened in winter.
 SensorLimits air_limits() {
   return {.lowest = celsius(-10.0),
           .highest = celsius(50.0),
@@ -39,7 +39,7 @@ SensorLimits air_limits() {
           .celsius_power_on_values = true};
 }
 
-/// Parts, coolant, motors: no correction uses them.
+/// Limits for parts, coolant and motors. No correction uses them.
 SensorLimits part_limits() {
   return {.lowest = celsius(-50.0),
           .highest = celsius(200.0),
@@ -48,7 +48,8 @@ SensorLimits part_limits() {
           .celsius_power_on_values = true};
 }
 
-/// A storm changes the pressure by 10 hPa/h, a ventilation or a gate by 1 hPa at once.
+/// Limits for the pressure. A storm changes it by 10 hPa/h, a ventilation or an opened gate by 1
+/// hPa at once.
 SensorLimits pressure_limits() {
   return {.lowest = 600.0 * kPascalsPerHectopascal,
           .highest = 1100.0 * kPascalsPerHectopascal,
@@ -92,15 +93,16 @@ std::optional<std::size_t> place_of(const Config& config, const std::string& nam
   return std::nullopt;
 }
 
-/// Sensor of a device that measures in rounds.
+/// Sets the options of a sensor of a device that measures in rounds.
 void set_device(const Config& config, const EnvironmentSource& device, CheckedSensor& sensor) {
   sensor.device = device.device;
   sensor.hold = config.sensors.hold;
   sensor.limits.forget_after = std::max(config.sensors.forget, kReadingsRemembered * device.period);
 }
 
-/// Sensor of the tracker's controller. It arrives when it changes, and every ten seconds while
-/// points arrive: no second reading confirms the first soon, and a refused value is not held.
+/// Sets the options of a sensor of the tracker's controller. A reading arrives when it changes, and
+/// every ten seconds while points arrive. Therefore a second reading does not soon confirm the
+/// first, and a refused value is not held.
 void set_weather_station(const Config& config, const TrackerSource& tracker,
                          CheckedSensor& sensor) {
   sensor.device = tracker.device;

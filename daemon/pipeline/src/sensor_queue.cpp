@@ -13,8 +13,8 @@ using protocol::HostTime;
 
 namespace {
 
-/// The devices of a machine measure different quantities: their lowest one orders equal instants,
-/// whatever numbers the devices have.
+/// Order of waiting samples. For equal instants the lowest quantity decides, because the devices of
+/// a machine measure different quantities; the numbers of the devices have no influence.
 auto order_of(const SensorQueue::Waiting& waiting) {
   return std::tuple{waiting.due, waiting.weather, waiting.sample.head.time,
                     std::countr_zero(waiting.mask)};

@@ -1,4 +1,4 @@
-// The state of SensorChecks as an attachment of a recording.
+// Converts the state of SensorChecks to and from an attachment of a recording.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 using std::chrono::nanoseconds;
 
-/// JSON has no NaN. A number has all its digits.
+/// A number with all its digits; null for NaN, which JSON does not have.
 json json_of(double value) {
   return std::isnan(value) ? json{} : json(value);
 }
@@ -28,7 +28,8 @@ double double_of(const json& value) {
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
 }
 
-/// A number of another version: the next reading is judged without it.
+/// The doubt with this number. For an unknown number, which another version wrote, the next reading
+/// is judged without a doubt.
 calib::SensorDoubt doubt_of(int number) {
   const bool known = number >= 0 && number <= static_cast<int>(calib::SensorDoubt::Others);
   return known ? static_cast<calib::SensorDoubt>(number) : calib::SensorDoubt::None;
@@ -108,7 +109,7 @@ Result<void> SensorChecks::go_on(const RecordingAttachment& attachment) {
         s.reading = double_of(j.at("reading"));
         s.lowest = double_of(j.at("lowest"));
         s.highest = double_of(j.at("highest"));
-        if (!s.options.twin) {  // the configuration may have had one
+        if (!s.options.twin) {  // the configuration of the earlier run may have had a twin
           s.twin_differs = 0;
           s.twins_doubted = false;
           if (s.doubt == calib::SensorDoubt::Twin) s.doubt = calib::SensorDoubt::None;

@@ -25,7 +25,7 @@ json state_json(const json& state, const json& host_ns, const json& utc_ns) {
   return {{"host_ns", host_ns}, {"utc_ns", utc_ns}, {"sensors", state}};
 }
 
-/// From a host time of the earlier run to one of this run.
+/// Difference to add to a host time of the earlier run to get a host time of this run.
 nanoseconds shift(const SensorStateClock& then, const SensorStateClock& now) {
   const auto passed = std::max(nanoseconds{0}, now.utc - then.utc);
   const auto host_passed = std::chrono::duration_cast<nanoseconds>(

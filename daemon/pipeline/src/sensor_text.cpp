@@ -36,7 +36,7 @@ std::string range_text(std::size_t place, double lowest, double highest) {
                      (highest - as.zero) * as.per_si, as.unit);
 }
 
-/// What the sensor sends and what was expected.
+/// The reading of the sensor and the expected values, as text.
 std::string cause_of_doubt(const CheckedSensor& sensor, const DoubtedReading& d) {
   const auto reads = [&] {
     return fmt::format("it reads {}", value_text(sensor.place, d.reading));

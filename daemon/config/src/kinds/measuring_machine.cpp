@@ -14,7 +14,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// Both corners or none; each coordinate of the upper one above that of the lower one.
+/// Reads the corners of the volume. Adds a fault unless both corners or none are given, and each
+/// coordinate of the upper corner is above that of the lower one.
 void read_volume(ClassifiedSection& cmm, CmmConfig& config) {
   std::vector<double> min_m, max_m;
   const bool low = cmm.get(operation("volume_min_mm"), min_m, kMilli);
@@ -39,7 +40,8 @@ void read_cmm(ClassifiedSection& root, Config& out, StreamNames& names) {
   get_bounded(cmm, operation("name"), config.name, bound_of<v1::ProbeTrigger>("device"));
   get_host(cmm, operation("host"), config.host, Need::Required);
   cmm.get_integer(operation("port"), config.port, 1, 65535);
-  // A reported position is that of the tip of the tool.
+  // The reported position is the position of the tip of the tool, so its meaning depends on the
+  // tool.
   const Role positions = axes_have_own_device(out) ? Role::Measurement : Role::Reading;
   cmm.get(Key{"tool", positions}, config.tool);
   cmm.get(operation("home"), config.home);

@@ -54,7 +54,8 @@ void read_probe(ClassifiedSection& root, Config& out, StreamNames& names) {
   if (!is_wired(counted)) {
     probe.fault("", fmt::format("needs {} with a latch_channel or an edge_channel",
                                 tables_with(Capability::CountedAxes)));
-  } else if (drivers::check(counted->card.wiring)) {  // else the wiring has a fault already
+  } else if (drivers::check(counted->card.wiring)) {  // otherwise a fault of the wiring has already
+                                                      // been added
     const auto valid = drivers::check(touch_options(config, counted->card.wiring, out.machine));
     if (!valid) probe.fault("", valid.error().text);
   }

@@ -26,7 +26,7 @@ void read_noise(ClassifiedSection& tracker, MachineConfig& machine) {
   tracker.get(operation("u_range_offset_um"), machine.u_range_offset_m, kMicro, kNotNegative);
 }
 
-/// After the noise.
+/// Reads the keys about the place of the tracker. Call it after the keys about noise were read.
 void read_place(ClassifiedSection& tracker, MachineConfig& machine) {
   constexpr std::size_t kLongest = 64;
   tracker.get_maybe_empty(operation("place"), machine.tracker_place);
@@ -102,7 +102,7 @@ void read_point_rate(ClassifiedSection& tracker, TrackerConfig& out) {
 /// Adds a fault for each key that applies only to the other mode: ignoring it silently would hide a
 /// mistake.
 void read_tracker_mode(ClassifiedSection& tracker, TrackerConfig& out) {
-  constexpr int kLongest_ms = 60'000;  // emScon
+  constexpr int kLongest_ms = 60'000;  // longest time that emScon accepts
   tracker.get_word<TrackerModeConfig>(operation("mode"), out.mode,
                                       {{"continuous", TrackerModeConfig::Continuous},
                                        {"stationary", TrackerModeConfig::Stationary}});
@@ -148,7 +148,7 @@ void read_search(ClassifiedSection& tracker, TrackerConfig& out) {
   misses("search_timeout_s", "search_radius_mm");
 }
 
-/// The reflector, and how the tracker finds it.
+/// Reads the keys for the reflector and for the way in which the tracker finds it.
 void read_beam(ClassifiedSection& tracker, Role points, TrackerConfig& out) {
   tracker.get_maybe_empty(Key{"reflector", points}, out.reflector);
   if (out.reflector.size() > drivers::kLongestReflectorName)
@@ -168,8 +168,8 @@ double default_u_scale(WeatherConfig weather, const toml::node* air) {
   return corrected ? 0.0 : u_of_unmeasured_air();
 }
 
-/// As read_tracker_mode(). A program that prints lines decides about rate and duration; abbe must
-/// know them.
+/// As read_tracker_mode(), for a program that sends lines of text. The program determines rate and
+/// duration; abbe must know them.
 void read_mode_of_lines(ClassifiedSection& tracker, TrackerConfig& out) {
   using protocol::lines::Column;
   constexpr std::int64_t kLongest_ms = 60'000;
@@ -181,7 +181,8 @@ void read_mode_of_lines(ClassifiedSection& tracker, TrackerConfig& out) {
     std::int64_t time_ms = out.stationary_time / std::chrono::milliseconds{1};
     tracker.get_integer(operation("stationary_time_ms"), time_ms, 1, kLongest_ms, Need::Required);
     out.stationary_time = std::chrono::milliseconds{time_ms};
-    out.silence_timeout = std::chrono::seconds{60};  // a person moves the reflector meanwhile
+    // the line may be silent this long, because a person moves the reflector meanwhile
+    out.silence_timeout = std::chrono::seconds{60};
   } else {
     tracker.get(operation("point_rate_hz"), out.point_rate_hz, kPlain, {0.1, 10e3}, Need::Required);
     if (out.lines->format.column_count > 0 && !out.lines->format.has(Column::Time))
@@ -195,7 +196,8 @@ void read_mode_of_lines(ClassifiedSection& tracker, TrackerConfig& out) {
                                       stationary ? "stationary" : "continuous"));
 }
 
-/// The points come as lines of text. What abbe would send to a controller has no meaning.
+/// Reads a tracker whose points come as lines of text. Keys for commands to a controller have no
+/// meaning here.
 void read_line_tracker(ClassifiedSection& tracker, const toml::node* air, TrackerConfig& out) {
   tracker.state(Role::Measurement, "protocol", "lines");
   out.lines = read_lines(tracker);
@@ -282,7 +284,7 @@ std::optional<TrackerSource> points_of_tracker(const Config& config) {
 
   switch (tracker->weather) {
     case WeatherConfig::None:
-      // abbe cannot set the air of a program that prints lines.
+      // For a program that sends lines of text, abbe cannot set the air.
       source.air = tracker->lines ? TrackerSource::Air::LastSet : TrackerSource::Air::Assumed;
       source.air_setting = "tracker.weather = \"none\"";
       break;

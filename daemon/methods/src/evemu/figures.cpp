@@ -129,7 +129,7 @@ Table choice_table(const evemu::SparseChoice& choice) {
                     fmt::format("{:.3g}", choice.curvature)}}};
 }
 
-/// The readings of the balls, one polyline for each position of the array.
+/// The readings at the balls, one polyline for each position of the array.
 std::vector<std::vector<calib::Vector3>> places_of_balls(const evemu::Observations& observations) {
   std::vector<std::vector<calib::Vector3>> places;
   std::optional<int> position;
@@ -141,7 +141,7 @@ std::vector<std::vector<calib::Vector3>> places_of_balls(const evemu::Observatio
   return places;
 }
 
-/// V is relative to Ball1, which has no residuals.
+/// Adds the residuals at the balls. Ball1 has none, because V is relative to Ball1.
 void add_residuals_at_balls(RunFigures& figures, const evemu::Observations& observations,
                             const evemu::Solution& solution) {
   std::vector<std::string> names;
@@ -174,7 +174,8 @@ RunFigures evemu_figures(const EvemuCandidate& candidate) {
   figures.tables.push_back(fit_table(solution));
   if (!solution.pose_rotations_rad.empty()) figures.tables.push_back(poses_table(solution));
   if (solution.sparse) figures.tables.push_back(choice_table(*solution.sparse));
-  figures.conditions.emplace();  // the temperature of the array is in ModelDocument::artefact
+  // conditions without a temperature: ModelDocument::artefact has that of the array
+  figures.conditions.emplace();
   return figures;
 }
 

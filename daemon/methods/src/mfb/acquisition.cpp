@@ -21,7 +21,8 @@ namespace {
 
 using protocol::HostTime;
 
-/// The earlier touches must all be taken: the guide takes the same touches again.
+/// Takes the touches of earlier sessions. It is an Error if the guide does not take all of them,
+/// because it took the same touches before.
 Result<void> take_earlier(mfb::TouchGuide& guide, const std::vector<calib::Vector3>& earlier_m) {
   for (std::size_t i = 0; i < earlier_m.size(); ++i) {
     const mfb::GuidedTouch taken = guide.take(earlier_m[i]);
@@ -104,7 +105,8 @@ std::optional<double> MfbAcquisition::temperature_at(const protocol::Snapshot& t
   return std::isfinite(t_K) ? std::optional(t_K) : std::nullopt;
 }
 
-/// The temperature belongs to the pass that has the touch; a pass that is discarded loses its own.
+/// Takes a touch and adds the temperature to the pass that contains the touch. If the guide
+/// discards a pass, its temperatures are discarded, too.
 mfb::GuidedTouch MfbAcquisition::take_at(const calib::Vector3& reading_m, double temperature_K) {
   std::vector<std::size_t> before;
   for (const mfb::PassTouches& pass : guide_.passes()) before.push_back(pass.size());
@@ -118,7 +120,7 @@ mfb::GuidedTouch MfbAcquisition::take_at(const calib::Vector3& reading_m, double
   return taken;
 }
 
-/// Phase and instruction after a touch.
+/// Sets phase and instruction after a touch.
 void MfbAcquisition::follow_guide() {
   const auto& plan = guide_.plan();
   if (const auto& failure = guide_.failure()) {
@@ -175,7 +177,7 @@ mfb::Plan MfbAcquisition::plan_as_measured() const {
     const auto [low, high] = std::ranges::minmax_element(values_K);
     plan.measurements[pass].temperature_K = std::accumulate(values_K.begin(), values_K.end(), 0.0) /
                                             static_cast<double>(values_K.size());
-    // A rectangular distribution over the range of the values ([GUM] 4.3.7).
+    // The distribution is rectangular over the range of the values ([GUM] 4.3.7).
     u_drift_K = std::max(u_drift_K, (*high - *low) / (2.0 * std::numbers::sqrt3));
   }
   plan.noise.u_temperature_K = std::hypot(plan.noise.u_temperature_K, u_drift_K);

@@ -17,19 +17,19 @@ using calib::mfb::PassDirection;
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
-/// A number as short as it is exact enough, without "-0".
+/// The number with at most `digits` significant digits, as short as possible, without "-0".
 std::string number(double value, int digits) {
   const std::string text = fmt::format("{:.{}g}", value, digits);
   return text == "-0" ? "0" : text;
 }
 
 std::string vector_mm(const calib::Vector3& v_m) {
-  constexpr int kDigits = 10;  // 0.1 um in 10 m would need 8
+  constexpr int kDigits = 10;  // 0.1 um in 10 m needs 8 digits
   return fmt::format("[{}, {}, {}]", number(v_m[0] * kMmPerM, kDigits),
                      number(v_m[1] * kMmPerM, kDigits), number(v_m[2] * kMmPerM, kDigits));
 }
 
-/// Scaled so that the largest component is 1: 45 degrees are [1, 1, 0].
+/// The direction, scaled so that its largest component is 1: 45 degrees give [1, 1, 0].
 std::string direction(const calib::Vector3& v) {
   constexpr int kDigits = 9;
   constexpr double kZero = 1e-12;

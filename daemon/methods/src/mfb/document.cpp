@@ -34,7 +34,7 @@ class FiguresOfVectors {
   double sum_m_ = 0.0, squares_m2_ = 0.0, largest_m_ = 0.0, count_ = 0.0;
 };
 
-/// Of one member of the residuals of all passes.
+/// The figures of one member of the residuals, over all passes.
 ResidualFigures figures_of(const mfb::Solution& solution,
                            std::vector<calib::Vector3> mfb::PassResiduals::*vectors_m) {
   FiguresOfVectors all;
@@ -48,7 +48,7 @@ std::size_t used_touches(const mfb::Observations& o) {
   return count;
 }
 
-/// Not finite without degrees of freedom; model.json then contains 0.
+/// The value, or 0 if it is not finite, as for statistics without degrees of freedom.
 double finite_or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }

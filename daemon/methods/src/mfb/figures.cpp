@@ -42,7 +42,7 @@ Table chi_square_table(const mfb::Identification& found) {
   return table;
 }
 
-/// EA, EB, EC: rotations and squareness.
+/// True for names such as EA, EB, EC: rotations and squareness.
 bool is_angle_error(std::string_view name) {
   constexpr std::string_view kRotations = "ABC";
   return name.size() > 1 && kRotations.find(name[1]) != std::string_view::npos;
@@ -61,7 +61,8 @@ constexpr std::array kPartsOfBudget{PartOfBudget{"u", &mfb::Budget::u},
                                     PartOfBudget{"roll", &mfb::Budget::roll},
                                     PartOfBudget{"of these: drift", &mfb::Budget::drift}};
 
-/// A table of the lengths or of the angles. A part that is 0 for all errors has no column.
+/// A table of the uncertainty parts of all lengths, or of all angles. A part that is 0 for all
+/// errors has no column.
 Table budget_table(const std::vector<mfb::Budget>& budget, bool angles) {
   Table table{
       .title = fmt::format("Where the uncertainty comes from: {}", angles ? "angles" : "lengths"),
@@ -100,7 +101,7 @@ Table monte_carlo_table(const mfb::MonteCarlo& trials) {
                {"expected scatter of one ratio", fmt::format("{:.3f}", trials.scatter_of_ratio)}}};
 }
 
-/// Lowest and highest temperature of the bar.
+/// Lowest and highest temperature of the bar in its measurements.
 std::array<double, 2> temperatures_K(const mfb::Observations& o) {
   const auto [low, high] =
       std::ranges::minmax_element(o.passes, {}, &mfb::PassObservation::temperature_K);
@@ -120,7 +121,8 @@ Table bar_table(const MfbCandidate& candidate) {
                                                        high_K - kZeroCelsius_K)}}};
 }
 
-/// Corrections of the calibrated points that the adjustment found; no rows without them.
+/// Table of the corrections of the calibrated points that the adjustment found; without rows if
+/// there are none.
 Table corrections_table(const MfbCandidate& candidate) {
   const mfb::Bar& bar = candidate.found.observations.bar;
   const Eigen::VectorXd& all = candidate.found.solution.bar_correction_m;
@@ -140,7 +142,7 @@ Table corrections_table(const MfbCandidate& candidate) {
   return table;
 }
 
-/// Names of the measurements in each position.
+/// Names of the measurements, by position of the bar.
 std::vector<std::string> measurements_of_positions(const mfb::Observations& o) {
   std::vector<std::string> names(o.positions.size());
   for (const mfb::PassObservation& pass : o.passes) {
@@ -167,7 +169,7 @@ Table positions_table(const MfbCandidate& candidate) {
   return table;
 }
 
-/// At the calibrated points, in bar axes.
+/// Adds the residuals at the calibrated points, in bar axes.
 void add_residuals_of_passes(RunFigures& figures, const mfb::Solution& solution) {
   std::vector<std::string> names;
   std::vector<RunResidual> residuals;

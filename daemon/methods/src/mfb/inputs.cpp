@@ -15,7 +15,7 @@ namespace mfb = calib::mfb;
 
 namespace {
 
-/// What the drift of a pass is known from.
+/// Adds notes about the passes whose drift is not determined by a pair of passes.
 void add_notes_on_pairs(std::span<const mfb::Measurement> measurements,
                         std::vector<std::string>& notes) {
   const auto forward_of = mfb::pairs_of(measurements);

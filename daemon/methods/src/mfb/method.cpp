@@ -37,7 +37,8 @@ MfbRequest::File file_of(const json& object) {
 /// Limits the size of a request, because every touch is compared with every place of the bar in the
 /// hub's cycle, and the request is written into the recording.
 Result<void> check_size(const MfbRequest& request) {
-  // Together below the largest request of the control socket, 4 MiB, with 60 bytes for a touch.
+  // With 60 bytes for a touch, both together are below the largest request of the control socket, 4
+  // MiB.
   constexpr std::size_t kMostText = 1 << 18, kMostEarlier = 50'000;
   if (request.bar.text.size() <= kMostText && request.plan.text.size() <= kMostText &&
       request.earlier_m.size() <= kMostEarlier)
@@ -64,7 +65,7 @@ Result<void> check_source_of_touches(const Config& config) {
   return {};
 }
 
-/// The plan must show all 21 errors.
+/// Checks that the plan determines all 21 errors.
 Result<void> check_plan(const MfbRequest& request, const mfb::MfbMachine& machine) {
   const auto bar = parse_bar_toml(request.bar.text, request.bar.name);
   ABBE_TRY(bar);

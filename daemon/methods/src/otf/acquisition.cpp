@@ -18,12 +18,12 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// A machine that is farther from its leg than the tolerance for longer than this is on a later leg:
-// the beam was interrupted when the machine passed the corner. For a shorter time, a change in the
-// mapping of the tracker's clock can cause such a distance.
+// If the machine is farther from its leg than the tolerance for longer than this, it is on a later
+// leg: the beam was interrupted when the machine passed the corner. For a shorter time, a change in
+// the mapping of the tracker's clock can cause such a distance.
 constexpr auto kCornerMissed = std::chrono::milliseconds{500};
 constexpr auto kMarkEvery = std::chrono::seconds{2};
-// A machine that is slower than this over half a minute stands.
+// A machine that is slower than this over half a minute is at standstill.
 constexpr double kSlowest_m_per_s = 0.1e-3;
 
 std::string text(const Vector3& q) {
@@ -170,7 +170,7 @@ void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
   };
 
   const std::size_t vertex = near(leg_) ? leg_ : leg_ + 1;
-  // Near two vertices at once it is ambiguous at which one the machine is: no comparison is made.
+  // Near two vertices at once it is not known at which one the machine is; no comparison is made.
   if (!near(vertex) || (vertex == leg_ && near(leg_ + 1)) || (leg_ > 0 && near(leg_ - 1))) return;
   const Vector3& nominal = vertices[vertex];
   const auto effect = effect_of(s, options_.environment);
@@ -331,17 +331,17 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
     here = on_leg(leg_);
   }
 
-  // Short legs that were driven between two tracker points, too: the direction of travel behind
-  // them depends on them.
+  // Short legs that the machine travelled between two tracker points are added, too, because the
+  // direction of travel after them depends on them.
   while (begun_leg_ < leg_) begin_leg(begun_leg_ + 1, point, q);
   on_leg_at_ = point.time;
   driven_m_ = driven_at_m_[leg_] + here.along_m;
   mark_way(point.time);
 }
 
-/// The run is complete when the machine stands still at the last vertex and is on the last leg, or
-/// on one from whose end the rest of the path is at most path_tolerance_m long: the machine may
-/// have driven the last short legs between two tracker points.
+/// True if the run is complete: the machine stands still at the last vertex and is on the last leg,
+/// or on a leg from whose end the rest of the path is at most path_tolerance_m long. In the second
+/// case the machine may have travelled the last short legs between two tracker points.
 bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
   return driven_at_m_.back() - driven_at_m_[leg_ + 1] <= options_.path_tolerance_m &&
          (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&

@@ -20,7 +20,7 @@ ResidualFigures document_figures(const calib::otf::ResidualStatistics& s) {
   return {s.mean_abs_m, s.rms_m, s.max_abs_m};
 }
 
-/// Statistics that need degrees of freedom are not finite without any; model.json then contains 0.
+/// The value, or 0 if it is not finite, as for statistics without degrees of freedom.
 double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
@@ -43,7 +43,8 @@ ModelStatistics model_statistics(const calib::otf::Solution& solution) {
           .degrees_of_freedom = static_cast<double>(s.degrees_of_freedom)};
 }
 
-/// rms before and after in equal intervals of the paths of all runs, one after the other.
+/// The rms before and after compensation, in equal intervals of the paths of all runs, one after
+/// the other.
 class RmsAlongPath {
  public:
   explicit RmsAlongPath(std::span<const RunResiduals> runs) {
@@ -86,9 +87,10 @@ class RmsAlongPath {
   std::array<double, kIntervals> before_{}, after_{}, counts_{};
 };
 
-/// The rows behind a vertex of the path, up to the row before the current one. Not every row is
-/// compared with each new line, because a leg has thousands of rows: their distances from the line
-/// change by less than the turn of the line times their distance from the vertex.
+/// The rows after the last vertex of the path, up to the row before the current one. A leg has
+/// thousands of rows, so the rows are not compared with the line to each new row: if the direction
+/// of the line changes, the distance of a row from it grows at most by that change times the
+/// distance of the row from the vertex.
 class SkippedRows {
  public:
   [[nodiscard]] bool empty() const { return rows_m_.empty(); }
@@ -106,7 +108,7 @@ class SkippedRows {
     return vertex_m;
   }
 
-  /// Whether a row is farther than kStraight_m from the line from the vertex through `q_m`.
+  /// True if a row is farther than kStraight_m from the line from the vertex through `q_m`.
   [[nodiscard]] bool one_lies_aside(const calib::Vector3& q_m) {
     const calib::Vector3 chord_m = q_m - vertex_m_;
     const double length_m = chord_m.norm();
@@ -138,7 +140,7 @@ class SkippedRows {
   double reach_m_ = 0.0;                              ///< largest distance of a row from the vertex
 };
 
-/// The driven path: its rows in order, without those that lie on the straight line between others.
+/// The path of a run: its rows in order, without rows that lie on the straight line between others.
 std::vector<calib::Vector3> driven_path(const RunResiduals& run) {
   std::vector<const calib::otf::PlacedResidual*> rows;
   for (const auto& row : run) rows.push_back(&row);

@@ -60,7 +60,8 @@ OtfTask otf_task(const OtfRun& run, const Config& config, const IdentificationWa
   task.options.mode = run.mode;
   task.unmeasured_air = run.unmeasured_air;
 
-  // A live run has scale readings, and they were found to agree with the path at its vertices.
+  // A live run has scale readings. The acquisition has already compared them with the path at its
+  // vertices, and they agree.
   task.options.orientation.scales_agree = true;
   task.options.stopped = watch.stopped;
   if (watch.progress)

@@ -56,7 +56,7 @@ calib::otf::Path otf_path(std::span<const AxisPosition> path_m) {
 
 namespace {
 
-/// Whether a run along the path determines the tables.
+/// Checks that a run along the path determines the tables.
 calib::Result<void> determines_tables(const calib::otf::Path& path,
                                       const calib::otf::Machine& machine, calib::otf::Mode mode,
                                       calib::TravelDependence backlash) {

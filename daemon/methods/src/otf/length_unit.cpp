@@ -32,7 +32,7 @@ double diagonal_m(const calib::MachineNodes& travel) {
   return lengths.norm();
 }
 
-/// How many times one is larger than the other.
+/// The ratio of the larger to the smaller value.
 double ratio(double a, double b) {
   return std::max(a / b, b / a);
 }

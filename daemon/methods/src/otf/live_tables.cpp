@@ -18,8 +18,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// A pose that is corrected twice is exact to the noise; more corrections mean a path that does not
-/// fit, which the identification reports.
+/// Most corrections of the pose. After two corrections the pose is exact within the noise. If more
+/// were needed, the path does not fit, which the identification reports.
 constexpr int kMostCorrections = 2;
 
 void append(LiveTable& table, const calib::otf::NodeSoFar& node) {
@@ -87,8 +87,9 @@ void OtfLiveTables::add(const RunPoint& point) {
   if (point.usable && p_m.allFinite() && !at_nest) estimate_.add(p_m);
 }
 
-/// The vertices of a leg are corrected by the mean temperature of the scales up to the time of its
-/// accumulation, those of the identification by the mean of the run.
+/// Adds the new points to the estimate. The vertices of a leg are corrected by the mean temperature
+/// of the scales up to the time at which the leg is added. In contrast, the identification uses the
+/// mean over the whole run.
 void OtfLiveTables::add_points() {
   const std::size_t end = chunks_.size() * RunPoints::kPointsInChunk + tail_.size();
   for (; next_point_ < end; ++next_point_) {

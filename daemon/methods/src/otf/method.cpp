@@ -27,7 +27,7 @@ nlohmann::json OtfMethod::to_json(const Request& request) {
 
 namespace {
 
-/// Throws like json::get() for a text that is no mode.
+/// The mode of the request. Throws like json::get() for a text that is not a mode.
 std::optional<calib::otf::Mode> mode_of(const nlohmann::json& object, const Config* config) {
   if (!object.contains("mode"))
     return config != nullptr ? std::optional{calib_of(config->otf.mode)} : std::nullopt;

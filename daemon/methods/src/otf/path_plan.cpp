@@ -9,7 +9,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// EAX, EC0Y: in rad; EXX, EZY: in m.
+/// True for errors such as EAX and EC0Y, in rad; false for EXX and EZY, in m.
 bool is_angle(const std::string& iso_name) {
   return iso_name.size() > 1 && iso_name[1] >= 'A' && iso_name[1] <= 'C';
 }

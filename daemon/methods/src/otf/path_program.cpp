@@ -25,7 +25,7 @@ struct ProgramText {
   std::vector<std::string> (*dwell)(double seconds);
 };
 
-/// "-300", "12.5": four decimals at most, no negative zero.
+/// The number with at most four decimals and without a negative zero: "-300", "12.5".
 std::string decimal(double value) {
   constexpr double kPerUnit = 1e4;
   const double rounded = std::round(value * kPerUnit) / kPerUnit + 0.0;
@@ -35,7 +35,7 @@ std::string decimal(double value) {
   return text;
 }
 
-/// Heidenhain: with a sign.
+/// The number with a sign, as Heidenhain controls require it.
 std::string signed_decimal(double value) {
   const std::string text = decimal(value);
   return text.front() == '-' ? text : "+" + text;
@@ -99,7 +99,7 @@ ProgramText text_of(Dialect dialect) {
   return linuxcnc_text();
 }
 
-/// Block numbers: Siemens N10 N20 .., Heidenhain 0 1 2 .., LinuxCNC none.
+/// The blocks with numbers: Siemens N10 N20 .., Heidenhain 0 1 2 .., LinuxCNC none.
 std::string numbered(const std::vector<std::string>& blocks, Dialect dialect) {
   std::string text;
   for (std::size_t i = 0; i < blocks.size(); ++i) {

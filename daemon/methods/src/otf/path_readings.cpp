@@ -15,10 +15,10 @@ namespace {
 
 using calib::Vector3;
 
-/// A vertex is reached if the machine comes within this distance; the same as in a live run.
+/// The machine has reached a vertex if it comes within this distance, as in a live run.
 const double kNear_m = AcquisitionOptions{}.vertex_tolerance_m;
 
-/// The reading closest to a vertex that is not reached yet.
+/// The reading closest to the next vertex that the machine has not reached yet.
 struct Closest {
   double distance_m = std::numeric_limits<double>::infinity();
   double time_s = 0.0;
@@ -69,7 +69,7 @@ Result<std::size_t> compare_with_path(const std::string& file, std::span<const E
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, contradiction));
   };
 
-  std::size_t next = 0;  // vertices before it were reached
+  std::size_t next = 0;  // the vertices before this index were reached
   std::set<std::size_t> stood;
   Closest closest;
 

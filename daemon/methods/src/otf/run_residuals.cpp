@@ -19,7 +19,7 @@ namespace {
 
 using calib::otf::PlacedResidual;
 
-/// First and last time of a run, tracker's clock; nullopt if a row has no time.
+/// First and last time of a run, in times of the tracker's clock; nullopt if a row has no time.
 std::optional<std::array<double, 2>> times_of(const RunResiduals& run) {
   std::optional<std::array<double, 2>> times;
   for (const PlacedResidual& r : run) {
@@ -30,8 +30,8 @@ std::optional<std::array<double, 2>> times_of(const RunResiduals& run) {
   return times;
 }
 
-/// The residuals of all runs with the time from the beginning of the first; a run begins where the
-/// run before it ended.
+/// The residuals of all runs. The times count from the beginning of the first run; each further run
+/// begins where the run before it ended.
 struct AllRuns {
   std::vector<std::string> part_names;
   std::vector<RunResidual> residuals;

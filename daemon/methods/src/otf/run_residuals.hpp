@@ -1,5 +1,5 @@
 #pragma once
-/// What a model document keeps of the residuals of a run along a path. Pure.
+/// The figures of the residuals of a run along a path that a model document contains. Pure.
 
 #include <span>
 
@@ -8,8 +8,9 @@
 
 namespace abbe::daemon {
 
-/// Adds residuals by leg and over time, held-out observations by cell of `volume`, duration and
-/// feed. Several runs follow each other. `stands`: legs are positions, and there is no feed.
+/// Adds the residuals by leg and over time, the held-out observations by cell of `volume`, the
+/// duration and the feed. Several runs follow each other. `stands`: the parts are positions instead
+/// of legs, and there is no feed.
 void add_run_residuals(RunFigures& figures, std::span<const RunResiduals> runs,
                        const calib::ValidityVolume& volume, bool stands);
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr auto kCounted = std::chrono::milliseconds{500};
 constexpr auto kJudgedEvery = std::chrono::milliseconds{100};
-// Longer than the third of a second between two bursts of a tracker, with some delay.
+// This is longer than the third of a second between two bursts of a tracker, plus some delay.
 constexpr auto kSilence = std::chrono::milliseconds{1500};
 
 std::string mm_text(const calib::Vector3& q) {
@@ -88,7 +88,8 @@ std::vector<StartCondition> StartCheck::judged() const {
   return {tracker(), axes(), position(), standstill()};
 }
 
-/// "47 % of the tracker points have axis positions, the clock ..."; empty: nothing is missing.
+/// The conditions that do not hold: "47 % of the tracker points have axis positions, the clock
+/// ..."; empty: all hold.
 std::string StartCheck::missing() const {
   std::vector<std::string> texts;
   for (const StartCondition& c : conditions_)
@@ -96,7 +97,7 @@ std::string StartCheck::missing() const {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-/// Where the machine is after it has left the first vertex.
+/// The position of the machine relative to its legs after it has left the first vertex.
 StartCheck::Departure StartCheck::departure(const calib::Vector3& q) const {
   const auto leg = calib::otf::nearest_on_leg(options_.first_m, options_.second_m, q);
   if (leg.off_m > options_.path_tolerance_m) return Departure::ElsewhereThanThePath;

@@ -25,8 +25,9 @@ struct TimedPlace {
   Vector3 p_m = Vector3::Zero();
 };
 
-/// Places at equal distances in the sequence. Parts are short compared with the time from one
-/// vertex to the next, so that a dwell is not in the parts in which the machine moves.
+/// Places at equal distances in the sequence of rows. The parts between them are short compared
+/// with the time from one vertex to the next, so that parts in which the machine moves contain no
+/// dwell.
 template <class Rows, class Place>
 std::vector<TimedPlace> thinned(const Rows& rows, const PathFile& path, const Place& place_of) {
   constexpr std::size_t kLeastParts = 500, kPartsOfLeg = 20;
@@ -45,8 +46,8 @@ double length_m(const PathFile& path) {
   return sum_m;
 }
 
-/// Median over the parts between the places in which the machine moves: those longer than a quarter
-/// of the mean part of the path. nullopt without such parts.
+/// Median of the speeds over the parts between the places in which the machine moves, that is, the
+/// parts longer than a quarter of the mean part of the path. nullopt if there are none.
 std::optional<double> speed_m_per_s(const std::vector<TimedPlace>& places, double path_m) {
   constexpr double kMoves = 0.25;
   std::vector<double> speeds;
@@ -83,7 +84,8 @@ Expected expected_speed(const PathFile& path) {
           fmt::format("{} states a feed_mm_per_min of {}", path.source.name, stated)};
 }
 
-/// "; they fit as milliseconds"; empty if no unit fits.
+/// Text that names the unit with which the times fit, "; they fit as milliseconds"; empty if no
+/// unit fits.
 std::string unit_that_fits(double v_m_per_s, const Expected& expected) {
   struct Unit {
     const char* name;

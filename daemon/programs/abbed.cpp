@@ -1,5 +1,5 @@
-// abbed: the daemon. Runs in the foreground, logs to stderr, notifies systemd when it is ready and
-// feeds its watchdog.
+// abbed: the daemon. It runs in the foreground, logs to stderr, notifies systemd when it is ready,
+// and resets the watchdog of systemd.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <signal.h>
@@ -71,7 +71,7 @@ std::string text_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>{in}, {}};
 }
 
-/// abbe-dds in the folder of abbed; if it is not there, the one in PATH.
+/// The path of abbe-dds: in the folder of abbed, or else the one in PATH.
 std::string dds_program() {
   std::error_code error;
   const auto beside =
@@ -79,8 +79,8 @@ std::string dds_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
 }
 
-/// Keys that belong to the user of abbe-dds can be checked by root only: abbe-dds checks them
-/// itself.
+/// Checks the keys. Keys that belong to the user of abbe-dds can be checked by root only; abbe-dds
+/// then checks them itself.
 Result<void> check_dds_keys(const DdsConfig& dds) {
   const auto& security = dds.security;
   if (security.empty()) return {};
@@ -93,7 +93,8 @@ Result<void> check_dds_keys(const DdsConfig& dds) {
   return {};
 }
 
-/// --check-config: prints all faults, or what was understood and what is improbable.
+/// Option --check-config: prints all faults; without a fault, prints how abbe understood the
+/// configuration and which values are improbable.
 int check(const std::string& file) {
   const auto checked = check_config(file, static_cast<int>(::sysconf(_SC_NPROCESSORS_CONF)));
   if (!checked) return refuse({ErrorCode::BadInput, checked.error().text, checked.error().details});
@@ -111,7 +112,7 @@ int check(const std::string& file) {
   return kDone;
 }
 
-/// Runs until a signal or a hub that hangs ends abbed.
+/// Runs until a signal arrives or the hub hangs. Returns the exit code.
 int run(Abbed& abbed, const sigset_t& stop) {
   const auto feed_period = watchdog_period();
   auto next_feed = std::chrono::steady_clock::now();
@@ -134,8 +135,8 @@ int run(Abbed& abbed, const sigset_t& stop) {
       if (hangs) abbed.stop_machine();
     }
     if (hangs) {
-      // The hub hangs. Without a watchdog nothing would restart abbed, so it continues: the threads
-      // of devices and recorder may still work.
+      // The hub hangs. Without a watchdog no program would restart abbed, so abbed continues: the
+      // threads of devices and recorder may still work.
       if (!feed_period) continue;
       return kInternal;
     }
@@ -147,13 +148,13 @@ int run(Abbed& abbed, const sigset_t& stop) {
   }
 }
 
-/// True if no measuring machine may be moving on.
+/// True if no measuring machine may still be moving.
 bool stands(const std::optional<abbe::drivers::IppStop>& machine) {
   return !machine || machine->outcome == abbe::drivers::IppStopOutcome::Stopped;
 }
 
-/// Reports a measuring machine that may be moving on, before anything that can wait for a disk.
-/// Returns the exit code: `code`, or another one for such a machine.
+/// Reports a measuring machine that may still be moving, before any step that may wait for a disk.
+/// Returns the exit code: `code`, or the code for such a machine.
 int report_machine(const std::optional<abbe::drivers::IppStop>& machine, int code) {
   using Outcome = abbe::drivers::IppStopOutcome;
   if (stands(machine)) return code;
@@ -166,8 +167,8 @@ int report_machine(const std::optional<abbe::drivers::IppStop>& machine, int cod
                                                      : ExitCode::StopNotConfirmed);
 }
 
-/// Stops all parts and reports it; returns the exit code. Ends the process at once if that takes
-/// too long.
+/// Stops all parts and reports the result; returns the exit code. Ends the process at once if this
+/// takes too long.
 int end_in_order(std::unique_ptr<Abbed> abbed, int code) {
   notify_stopping();
   const ExitDeadline deadline{
@@ -209,8 +210,8 @@ int abbed_main(int argc, char** argv) {
 
   if (check_only) return check(file);
   auto config = load_config(file);
-  // BadInput also if the file cannot be read: with Io systemd would restart abbed again and again,
-  // although only a person can repair the file.
+  // The code is BadInput even if the file cannot be read. With the code Io systemd would restart
+  // abbed again and again, although only a person can repair the file.
   if (!config) return refuse({ErrorCode::BadInput, config.error().text, config.error().details});
 
   const sigset_t stop = prepare_signals();

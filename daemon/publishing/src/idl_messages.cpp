@@ -22,7 +22,7 @@ std::int64_t ns(protocol::HostTime t) {
   return t.time_since_epoch().count();
 }
 
-/// Truncates to at most `bound` bytes, between two UTF-8 characters.
+/// The text, truncated to at most `bound` bytes between two UTF-8 characters.
 std::string cut(std::string_view text, std::size_t bound) {
   constexpr unsigned kContinuationMask = 0xC0, kContinuation = 0x80;
   if (text.size() > bound)
@@ -49,8 +49,8 @@ std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
   return hull;
 }
 
-/// The mean of both directions of travel: the gate and the held-out legs test the mean, and a
-/// vector that steps at a reversal could move the axis back and step again.
+/// V as the mean of both directions of travel. The gate and the held-out legs test the mean; a
+/// vector that steps when the direction reverses could move the axis back, and then step again.
 calib::VolumetricError error_in_either_direction(const calib::VolumetricModel& model,
                                                  const calib::Vector3& q_m,
                                                  const calib::Vector3& tool_m) {
@@ -223,13 +223,13 @@ v1::Compensation compensation_message(v1::ModelStatus status, const PublishedMod
   m.position_m({s.position[0], s.position[1], s.position[2]});
   m.tool_offset_m(tool_offset_m);
 
-  // Age of the axis position to which this vector belongs; subscribers compare the age with
+  // The age is that of the axis position to which this vector belongs; subscribers compare it with
   // validity_ns.
   m.age_ns((stamp.now - s.head.time).count());
   m.validity_ns(validity.count());
   if (active == nullptr) return m;
   m.model_id(active->id);
-  if (!known) return m;  // a vector at an old position must not be published as valid
+  if (!known) return m;  // a vector for an old position must not be published as valid
   const auto e =
       error_in_either_direction(active->model, {s.position[0], s.position[1], s.position[2]},
                                 {tool_offset_m[0], tool_offset_m[1], tool_offset_m[2]});
@@ -244,7 +244,7 @@ v1::Compensation compensation_message(v1::ModelStatus status, const PublishedMod
 
 namespace {
 
-/// What is wrong now, then the last fault.
+/// The present condition, then the last fault.
 std::string fault_text(const drivers::DeviceStatus& d) {
   if (d.condition.empty() || d.last_fault.empty() || d.condition == d.last_fault)
     return d.condition.empty() ? d.last_fault : d.condition;

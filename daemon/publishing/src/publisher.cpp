@@ -17,8 +17,8 @@ std::chrono::nanoseconds period(double rate_hz) {
 
 }  // namespace
 
-/// True if a sample is to be sent now. The next one is due one period after this one was sent, not
-/// one period after this one was due.
+/// True if a sample must be sent now. The next sample is due one period after the time at which
+/// this one was sent, not one period after the time at which it was due.
 bool Publisher::due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz) {
   const bool axis_lost = (view.missing_mask & ~pace.missing_mask) != 0;
   if (now < pace.next && !axis_lost) return false;

@@ -10,7 +10,7 @@ using protocol::HostTime;
 
 namespace {
 
-/// The original message has reported the loss before it.
+/// The sample with lost_before = 0, because the original message has already reported the loss.
 EnvironmentSample without_gap(EnvironmentSample sample) {
   sample.head.lost_before = 0;
   sample.head.flags &= ~static_cast<protocol::SampleFlags>(protocol::SampleFlag::GapBefore);
@@ -40,7 +40,8 @@ void CarriedEnvironment::take(const EnvironmentSample& sample, std::string_view 
 void CarriedEnvironment::check_until(HostTime t) {
   queue_.check_until(t, [&](const SensorQueue::Waiting& read, const CheckedEnvironment&) {
     auto [last, fresh] = checked_.try_emplace(names_[read.device], read.sample);
-    // Sent too late: the pipeline does not use it after a later one.
+    // The sample arrived too late: the pipeline does not use a sample that is earlier than one it
+    // has used.
     if (!fresh && read.sample.head.time >= last->second.head.time) last->second = read.sample;
     state_at_ = std::max(state_at_, read.sample.head.time);
   });

@@ -1,8 +1,9 @@
 #pragma once
-/// What a further file of a recording begins with, so that its replay uses the readings of the
-/// environment sensors as the live run did: the state of the checks and the samples from then on.
-/// The checks run in the order of the pipeline (SensorQueue), and `watermark` later: points of the
-/// new file may describe instants up to that time before it, and need the samples of then.
+/// The beginning of a further file of a recording. It allows the replay of this file to use the
+/// readings of the environment sensors as the live run did: the state of the sensor checks, and the
+/// samples after this state. The checks run in the order of the pipeline (SensorQueue), but later
+/// by `watermark`. The reason: points of the new file may describe instants up to `watermark`
+/// before its beginning, and need the samples of that time.
 
 #include <chrono>
 #include <map>
@@ -35,18 +36,18 @@ class CarriedEnvironment {
 
   void accept(SensorAcceptance acceptance) { queue_.accept(std::move(acceptance)); }
 
-  /// A file begins behind the cycle `at`.
+  /// A new file begins after the cycle at time `at`.
   void begin_file(protocol::HostTime at) { check_until(state_until_ = at - watermark_); }
-  /// After begin_file(): whether the state contains the acceptance.
+  /// Call it after begin_file(). True if the state contains the acceptance.
   [[nodiscard]] bool contains(const SensorAcceptance& acceptance) const noexcept {
     return acceptance.from < state_until_;
   }
-  /// After begin_file().
+  /// Call it after begin_file().
   [[nodiscard]] bool checks_sensors() const noexcept { return checks_sensors_; }
   [[nodiscard]] RecordingAttachment state() const { return queue_.checks().to_attachment(); }
   [[nodiscard]] protocol::HostTime state_at() const noexcept { return state_at_; }
-  /// use(device, sample): of each device the last sample that the state contains, then the later
-  /// ones.
+  /// Calls use(device, sample): for each device first the last sample that the state contains, then
+  /// the later samples.
   template <class Use>
   void for_each(Use use) const {
     for (const auto& [name, sample] : checked_) use(std::string_view{name}, sample);
@@ -62,8 +63,9 @@ class CarriedEnvironment {
   bool checks_sensors_;
   std::string weather_station_;
   std::chrono::nanoseconds watermark_;
-  std::vector<std::string> names_;                              ///< by SensorQueue::Waiting::device
-  std::map<std::string, protocol::EnvironmentSample> checked_;  ///< the last one, by device
+  std::vector<std::string> names_;  ///< names by SensorQueue::Waiting::device
+  /// the last checked sample, by device
+  std::map<std::string, protocol::EnvironmentSample> checked_;
   protocol::HostTime state_at_{};
   protocol::HostTime state_until_{};
 };

@@ -18,8 +18,8 @@ struct TimedAttachment {
   std::uint64_t time_ns = 0;
 };
 
-/// Whether the next file needs the attachment. Call it for the attachments of a file from the
-/// newest to the oldest. `settled`: mask of the axes whose earlier zeros are not valid any more;
+/// True if the next file needs the attachment. Call it for the attachments of a file from the
+/// newest to the oldest. `settled`: mask of the axes whose earlier zeros are no longer valid;
 /// updated by the call.
 inline bool is_carried_on(const RecordingAttachment& attachment, const ZeroState& state,
                           std::uint32_t& settled) {

@@ -19,7 +19,8 @@ class ContentsCollector {
   void add(const protocol::mcap::Channel& channel);
   void add_metadata(protocol::mcap::Bytes content, std::uint64_t offset);
   void add_attachment(protocol::mcap::Bytes content, std::uint64_t offset);
-  /// `offset`, `bytes`: of the whole Chunk record in the file; `content`: its content.
+  /// `offset` and `bytes`: position and size of the whole Chunk record in the file; `content`: its
+  /// content.
   void add_chunk(const protocol::mcap::ScannedChunk& chunk, protocol::mcap::Bytes content,
                  std::uint64_t offset, std::uint64_t bytes);
   /// Adds the messages and channels among `records`, which begin at `offset` in the file; returns

@@ -33,8 +33,9 @@ std::uint64_t length_at(mcap::Bytes bytes, std::size_t at) {
   return number;
 }
 
-/// True if `tail` contains a whole chunk. Behind a truncated record nothing follows; if a whole
-/// chunk follows a record that seems truncated, the length of that record is damaged.
+/// True if `tail` contains a whole chunk. No chunk can follow a record that was truncated by the
+/// end of the file. If a whole chunk follows a record that seems truncated, the length of that
+/// record is damaged.
 bool contains_whole_chunk(mcap::Bytes tail) {
   constexpr std::byte kChunk{static_cast<std::uint8_t>(mcap::Opcode::Chunk)};
   constexpr std::size_t kRecordsSizeAt = mcap::kRecordHeadSize + kChunkHeadBytes - 8;
@@ -130,7 +131,7 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
       const auto last = bytes(size_ - mcap::kMagic.size(), mcap::kMagic.size());
       ABBE_TRY(last);
       complete_ = std::ranges::equal(*last, mcap::kMagic);
-      break;  // not complete_: the end is truncated and is rewritten
+      break;  // complete_ stays false: the end of the file is truncated and is rewritten
     }
     ABBE_TRY(take(**record));
     whole_until_ = (*record)->end();
@@ -170,7 +171,7 @@ Result<void> LeftFile::take_chunk(const Head& record) {
   chunk_->offset = record.offset;
   chunk_->length = record.end() - record.offset;
   if (chunk) chunk_->head = chunk->head;
-  chunk_->head.compression = {};  // the bytes that it refers to are freed
+  chunk_->head.compression = {};  // the bytes to which it refers are freed
   return {};
 }
 
@@ -223,10 +224,11 @@ void LeftFile::end_chunk() {
   chunk_.reset();
 }
 
-/// Decides what to do with the bytes behind the last whole record:
+/// Decides what to do with the bytes after the last whole record:
 /// - a truncated chunk: its whole messages are kept;
 /// - another truncated record: it is discarded;
-/// - zeros, which a power cut leaves if the file had its new size already: they are discarded;
+/// - zeros, which remain after a power cut if the file already had its new size: they are
+///   discarded;
 /// - anything else: the file is damaged.
 Result<void> LeftFile::judge_tail() {
   if (whole_until_ == size_) return {};

@@ -73,10 +73,10 @@ class LeftFile {
   struct timespec written_;
   protocol::mcap::SummaryBuilder summary_;
   bool has_attachments_ = false;
-  bool complete_ = false;  ///< the end is written already; only the file name is unfinished
+  bool complete_ = false;  ///< the end is already written; only the file still has to be renamed
   std::uint64_t whole_until_ = 0;
   std::optional<OpenChunk> chunk_;
-  protocol::mcap::Buffer rebuilt_;  ///< the last chunk, rebuilt; to be written at rebuilt_at_
+  protocol::mcap::Buffer rebuilt_;  ///< the last chunk, rebuilt; it will be written at rebuilt_at_
   std::uint64_t rebuilt_at_ = 0;
 };
 

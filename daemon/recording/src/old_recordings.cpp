@@ -46,8 +46,8 @@ bool is_of_run(const std::string& file, const std::string& name) {
          (file[name.size()] == '.' || file[name.size()] == '-');
 }
 
-/// Files with an earlier date were written while the clock was wrong (empty battery of the
-/// real-time clock), because abbe did not exist at that date.
+/// The date of the first version of abbe. A file with an earlier date was written while the clock
+/// was wrong (empty battery of the real-time clock).
 fs::file_time_type earliest_date() {
   using namespace std::chrono;
   return file_clock::from_sys(sys_seconds{sys_days{year{2026} / January / 1}});
@@ -82,7 +82,7 @@ Result<Recordings> recordings_in(const fs::path& directory, const std::string& r
   return found;
 }
 
-/// The files older than the rule permits, in order of name.
+/// The files that are older than the rule permits, ordered by name.
 std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rule) {
   std::vector<fs::path> old;
   const auto add = [&old](const std::vector<Dated>& some, fs::file_time_type until) {
@@ -91,7 +91,8 @@ std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rul
   };
 
   add(recordings.own, rule.now - rule.keep);
-  if (rule.lasted > rule.keep) {  // `now` is reliable: the clock was not set in `lasted`
+  if (rule.lasted > rule.keep) {  // `now` is reliable, because the clock was not set during
+                                  // `lasted`
     add(recordings.former, rule.now - rule.keep);
   } else if (!recordings.former.empty()) {
     const auto newest = std::ranges::max(recordings.former, {}, &Dated::written).written;
@@ -118,7 +119,7 @@ Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory,
 
   std::erase_if(old, [&named](const fs::path& file) {
     const std::string name = file.filename();
-    return named->contains(name.substr(0, name.find('.')));  // also NAME.damaged.mcap
+    return named->contains(name.substr(0, name.find('.')));  // this also matches NAME.damaged.mcap
   });
 
   std::error_code error;

@@ -13,7 +13,7 @@
 namespace abbe::daemon::recording {
 namespace {
 
-/// Size of a read; so few system calls that their time does not count.
+/// Size of one read. It is large, so that the time for system calls is negligible.
 constexpr std::uint64_t kWindow = std::uint64_t{1} << 20;
 
 tl::unexpected<Error> io_error(const char* verb, const std::filesystem::path& file, int error) {

@@ -24,7 +24,8 @@ class RecordedBytes {
   [[nodiscard]] static Result<std::unique_ptr<RecordedBytes>> open(
       const std::filesystem::path& file);
 
-  [[nodiscard]] std::uint64_t size() const noexcept { return size_; }  ///< when it was opened
+  /// size when the file was opened
+  [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
   /// Fills `out`. False if the file does not have these bytes any more or cannot be read; intact()
   /// is then an Error.
   [[nodiscard]] bool read(std::uint64_t offset, std::span<std::byte> out) const;
@@ -56,7 +57,7 @@ class ByteWindow {
  private:
   const RecordedBytes& file_;
   std::vector<std::byte> buffer_;
-  std::uint64_t begin_ = 0, size_ = 0;  ///< of the valid part of the buffer
+  std::uint64_t begin_ = 0, size_ = 0;  ///< position and size of the valid part of the buffer
 };
 
 }  // namespace abbe::daemon::recording

@@ -57,9 +57,9 @@ void Recorder::State::put(Stream stream, Dates dates, std::span<const std::byte>
                           utc_ns(dates.taken), utc_ns(dates.described), data});
 }
 
-/// Repeats environment samples in a new file: those that its instants need, and because some
-/// devices send only changes. The messages are dated at the beginning of the file; their content
-/// keeps the time of measurement.
+/// Repeats environment samples in a new file: samples that the instants in this file need, and the
+/// last sample of each device, because some devices send only changes. The messages are dated at
+/// the beginning of the file; their content keeps the time of measurement.
 void Recorder::State::add_carried_environment(protocol::HostTime begin) {
   v1::EnvironmentSample message;
   std::vector<std::byte> bytes;
@@ -102,7 +102,7 @@ Result<Recorder> Recorder::open(RecorderOptions options, RecordingInfo info, Wal
 Recorder::Recorder(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Recorder::Recorder(Recorder&&) noexcept = default;
 Recorder& Recorder::operator=(Recorder&& other) noexcept {
-  std::swap(state_, other.state_);  // the former recording is closed by the destructor of `other`
+  std::swap(state_, other.state_);  // the destructor of `other` closes the former recording
   return *this;
 }
 Recorder::~Recorder() {
@@ -163,8 +163,8 @@ void Recorder::record(const v1::CalibrationEvent& event, Taken taken) {
                         event.state() != name(SessionState::Idle);
 }
 
-/// The state with which the live run began, or the acceptance of a sensor. One that cannot be read
-/// is recorded, and not used.
+/// Takes the state with which the live run began, or the acceptance of a sensor. An attachment that
+/// cannot be read is recorded but not used.
 void Recorder::State::follow_sensors(const RecordingAttachment& attachment) {
   if (attachment.name == kSensorStateName) (void)environment_to_carry.go_on(attachment);
   if (attachment.name != kSensorAcceptedName) return;
@@ -184,7 +184,7 @@ void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
   if (s.status.state == RecorderStatus::State::Recording) s.end_cycle();
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});
 
-  // Without an open file the attachment is written at the beginning of the next one.
+  // If no file is open, the attachment is written at the beginning of the next file.
   if (s.status.state != RecorderStatus::State::Recording) return;
   mcap::Buffer bytes;
   const TimedAttachment& kept = s.attachments.back();

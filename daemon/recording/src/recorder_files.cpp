@@ -17,8 +17,8 @@ using IoResult = tl::expected<void, IoFault>;
 
 namespace {
 
-/// Free space needed in addition to min_free_bytes before a new file is begun, in chunks: otherwise
-/// a disk near the limit would fill the directory with very short files.
+/// Free space, in chunks, that is needed in addition to min_free_bytes before a new file is begun.
+/// Without it, a disk near the limit would fill the directory with very short files.
 constexpr std::uint64_t kResumeMarginChunks = 16;
 
 }  // namespace
@@ -52,8 +52,8 @@ void Recorder::State::forget_finished_requests() {
   attachments.assign(std::make_move_iterator(kept.rbegin()), std::make_move_iterator(kept.rend()));
 }
 
-/// A further file begins with the state of the sensor checks, so that its replay uses the values
-/// that the live run used.
+/// Prepares the state of the sensor checks for a further file, which begins with it so that its
+/// replay uses the values of the live run.
 void Recorder::State::carry_sensors_on() {
   environment_to_carry.begin_file(cycle);
   if (!environment_to_carry.checks_sensors()) return;
@@ -205,7 +205,7 @@ void Recorder::State::enter_fault(const IoFault& fault) {
   if (!file) return;
 
   if (messages_in_file == 0 && part > 1) {
-    file->discard();  // no messages in it: the next attempt uses its name again
+    file->discard();  // the file has no messages; the next attempt uses its name again
     --part;
     --status.files;
     file.reset();

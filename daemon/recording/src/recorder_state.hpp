@@ -81,13 +81,13 @@ struct Recorder::State {
   RecordingInfo info;
   std::vector<recording::TimedAttachment> attachments;
   std::optional<RecordingFile> file;
-  std::uint32_t part = 0;  ///< of the present file
+  std::uint32_t part = 0;  ///< number of the present file
   std::uint64_t messages_in_file = 0;
   bool end_written = false;
   std::string previous_file;
   /// a calibration is running: no new file is begun, so that its run is in one file
   bool calibrating = false;
-  /// The values when the last calibration was requested.
+  /// Values at the time when the last calibration was requested.
   struct AtRequest {
     std::uint32_t part = 0;
     std::uint64_t not_recorded = 0;
@@ -101,9 +101,9 @@ struct Recorder::State {
   /// number of repeated environment messages in the open chunk. They are also in an earlier file,
   /// and do not count as lost with the chunk.
   std::uint64_t carried_in_chunk = 0;
-  std::optional<ZeroState> axes_known;  ///< from the last axis sample
+  std::optional<ZeroState> axes_known;  ///< state after the last axis sample
   recording::CarriedEnvironment environment_to_carry;
-  protocol::HostTime cycle{};  ///< of the last message
+  protocol::HostTime cycle{};  ///< time of the last message's cycle
   RecorderStatus status;
   recording::LossLedger lost;  ///< messages lost, not yet reported in a later message
   /// messages of the open chunk, plus the losses they report: all are lost if the chunk cannot be
@@ -116,7 +116,8 @@ struct Recorder::State {
   bool unsynced = false;
   WallTime retry_at{};
 
-  // Reused: their capacity is kept, so that recording a sample allocates only at first.
+  // These buffers are reused and keep their capacity, so that recording allocates only for the
+  // first samples.
   std::vector<std::byte> payload;
   std::array<std::byte, protocol::kMaxRawBytesCdrSize> raw_payload{};
   v1::TrackerPoint tracker_point;

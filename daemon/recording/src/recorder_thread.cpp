@@ -27,7 +27,7 @@ constexpr std::chrono::microseconds kHubAdds{50};
 // whenever it grows, on the hub's thread.
 constexpr std::size_t kMostInOnePart = 1 << 20;
 
-/// A sample with the time of the hub cycle in which it came.
+/// A sample with the time of the hub cycle in which it was taken.
 template <class T>
 struct OfCycle {
   protocol::HostTime taken;
@@ -74,8 +74,8 @@ struct DigestRequest {
   std::uint64_t dropped = 0;
 };
 
-/// The data that wait for the recorder; within a topic in the order of the hub's cycles, which the
-/// recorded messages keep.
+/// The data that wait for the recorder. Within a topic they are in the order of the hub's cycles,
+/// which the recorded messages keep.
 struct Waiting {
   std::vector<OfCycle<protocol::TrackerPoint>> points;
   std::vector<OfCycle<protocol::AxisSample>> axes;
@@ -86,7 +86,7 @@ struct Waiting {
   std::vector<OfCycle<v1::CalibrationEvent>> events;
   std::vector<Attachment> attachments;
   std::vector<DigestRequest> digests;
-  std::uint64_t number = 0;  ///< of the last batch (Unwritten)
+  std::uint64_t number = 0;  ///< number of the last batch, see Unwritten
   /// True after a batch was dropped. Further batches are then dropped until the recorder has taken
   /// this object, so that the recording gets one gap and not many.
   bool full = false;
@@ -123,8 +123,8 @@ struct Waiting {
 /// Messages of each stream that were dropped since the last one that was not dropped.
 struct Dropped {
   std::uint32_t points = 0, axes = 0, environment = 0, touches = 0, touch_scans = 0;
-  std::vector<std::uint32_t> measured;  // of each device of the environment
-  std::vector<std::uint32_t> raw;       // of each device
+  std::vector<std::uint32_t> measured;  // for each device of the environment
+  std::vector<std::uint32_t> raw;       // for each device
 };
 
 template <class T>
@@ -153,13 +153,13 @@ void append(std::vector<OfCycle<EnvironmentOf>>& to, protocol::HostTime taken,
   report_dropped(to.back().what.sample.head, dropped);
 }
 
-/// When batches were handed over that the recorder has not taken yet. One entry stands for the
-/// batches of 50 ms: a stalled disk of an hour is 72,000 entries.
+/// The times at which batches were handed over that the recorder has not taken yet. One entry
+/// represents the batches of 50 ms: if the disk stalls for an hour, there are 72,000 entries.
 class Unwritten {
  public:
   using WallTime = Recorder::WallTime;
 
-  /// A batch is handed over at `now`; returns its number.
+  /// Adds a batch that is handed over at `now`; returns its number.
   std::uint64_t add(WallTime now) {
     ++number_;
     if (entries_.empty() || now - entries_.back().since >= kSpacing)
@@ -168,7 +168,7 @@ class Unwritten {
       entries_.back().last = number_;
     return number_;
   }
-  /// The recorder has the batches up to the number `passed`.
+  /// Removes the batches up to the number `passed`, which the recorder has taken.
   void forget(std::uint64_t passed) {
     while (!entries_.empty() && entries_.front().last <= passed) entries_.pop_front();
   }
@@ -199,10 +199,10 @@ struct RecorderThread::State {
   RecorderStatus known;                              // used by the thread that calls status()
   Dropped unreported;                                // used by the hub
   mutable Unwritten unwritten;                       // used by the hub
-  std::atomic<std::uint64_t> passed{0};              // to the recorder: hand-overs until now
-  std::atomic<std::int64_t> chunk_since_ns{0};       // see Recorder::open_chunk_since(); 0: none
-  std::uint64_t dropped_before_run = 0;              // used by the hub
-  std::string internal_error;  // of the recorder thread; not yet passed to Recorder::fail()
+  std::atomic<std::uint64_t> passed{0};  // number of the last batch that was passed to the recorder
+  std::atomic<std::int64_t> chunk_since_ns{0};  // see Recorder::open_chunk_since(); 0: none
+  std::uint64_t dropped_before_run = 0;         // used by the hub
+  std::string internal_error;  // of the recorder thread; not passed to Recorder::fail() yet
   std::atomic<std::uint64_t> dropped{0};
   std::atomic<bool> stopping{false};
   WakeUp wake_up;
@@ -252,12 +252,12 @@ struct RecorderThread::State {
       const std::uint64_t number = taken->number;
       write_all(*taken);
       note_written(number);
-      taken->clear();  // also breaks the promises of digests that were not made
+      taken->clear();  // this also breaks the promises of digests that were not made
       report();
     }
   }
 
-  /// The batches up to `number` are in the file, in the open chunk or lost.
+  /// Records that the batches up to `number` are in the file, in the open chunk, or lost.
   void note_written(std::uint64_t number) {
     const auto since = recorder.open_chunk_since();
     chunk_since_ns.store(since ? since->time_since_epoch().count() : 0, std::memory_order_relaxed);
@@ -312,7 +312,7 @@ struct RecorderThread::State {
   }
 
   void write(Waiting& data) {
-    std::vector<std::unique_ptr<Waiting>> earlier;  // the latest first
+    std::vector<std::unique_ptr<Waiting>> earlier;  // the latest part first
     for (auto part = std::move(data.earlier); part != nullptr;) {
       auto before = std::move(part->earlier);
       earlier.push_back(std::move(part));

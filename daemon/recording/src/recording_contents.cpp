@@ -16,15 +16,15 @@ using mcap::Opcode;
 using ChunkState = mcap::ScannedChunk::State;
 
 /// Largest summary, record and truncated chunk that are read; those of abbe have at most some MB. A
-/// larger one is a loss: damaged bytes that look like one, or made by another program.
+/// larger one is treated as a loss: it consists of damaged bytes, or another program made it.
 constexpr std::uint64_t kLargestRead = std::uint64_t{256} << 20;
 /// Records outside of chunks are kept in pieces of about this size.
 constexpr std::uint64_t kLooseBytes = std::uint64_t{1} << 20;
 
 struct PlacedRecord {
   Opcode opcode = Opcode::Header;
-  std::uint64_t offset = 0;  ///< of its opcode in the file
-  std::uint64_t length = 0;  ///< of its content
+  std::uint64_t offset = 0;  ///< position of its opcode in the file
+  std::uint64_t length = 0;  ///< length of its content
   [[nodiscard]] std::uint64_t content() const { return offset + mcap::kRecordHeadSize; }
   [[nodiscard]] std::uint64_t end() const { return content() + length; }
 };
@@ -39,7 +39,7 @@ std::optional<PlacedRecord> record_in(ByteWindow& file, std::uint64_t offset) {
   return record;
 }
 
-/// False: the record is a loss.
+/// True if the record is small enough to be read. If not, it is added as a loss.
 bool can_be_read(const PlacedRecord& record, ContentsCollector& collector) {
   if (record.length <= kLargestRead) return true;
   collector.lost(record.offset, record.end() - record.offset,
@@ -66,7 +66,7 @@ void add_whole_chunk(ByteWindow& file, const PlacedRecord& record, ContentsColle
   collector.add_chunk(chunk, content, record.offset, record.end() - record.offset);
 }
 
-// --- by the indexes
+// --- Contents found by the indexes
 
 /// Content of the record at the place of an index; nullopt if no such record is there.
 std::optional<mcap::Bytes> indexed(ByteWindow& file, Opcode opcode, std::uint64_t offset,
@@ -117,7 +117,7 @@ bool indexes_are_complete(const mcap::Summary& summary) {
          counted->attachment_count == summary.attachments.size();
 }
 
-// --- by reading all records
+// --- Contents found by reading all records
 
 /// Consecutive records outside of chunks, among them messages.
 class LooseRecords {
@@ -150,7 +150,7 @@ void collect_record(ByteWindow& file, const PlacedRecord& record, LooseRecords& 
   if (is_used && !can_be_read(record, collector)) return;
   switch (record.opcode) {
     case Opcode::Chunk:
-      loose.finish();  // the contents are in file order
+      loose.finish();  // this keeps the contents in file order
       return add_whole_chunk(file, record, collector);
     case Opcode::Channel:
     case Opcode::Message:
@@ -168,7 +168,7 @@ void collect_record(ByteWindow& file, const PlacedRecord& record, LooseRecords& 
   }
 }
 
-/// The chunk at `offset` that is cut off by the end of the file. False if there is none.
+/// Collects the chunk at `offset` that the end of the file truncates. False if there is none.
 bool collect_cut_chunk(ByteWindow& file, std::uint64_t offset, ContentsCollector& collector) {
   const auto head = file.at(offset, mcap::kRecordHeadSize);
   const auto record = head ? mcap::read_head(*head) : std::nullopt;
@@ -182,8 +182,8 @@ bool collect_cut_chunk(ByteWindow& file, std::uint64_t offset, ContentsCollector
   return true;
 }
 
-/// True if the bytes from `offset` to the end of the file are what a killed recorder or a power cut
-/// leaves: a truncated record, or zeros.
+/// True if the bytes from `offset` to the end of the file are the typical end after a kill or a
+/// power cut: a truncated record, or zeros.
 bool is_truncated_end(ByteWindow& file, std::uint64_t offset) {
   constexpr std::uint64_t kPiece = 65536;
   const auto first = file.at(offset, 1);
@@ -196,7 +196,8 @@ bool is_truncated_end(ByteWindow& file, std::uint64_t offset) {
   return true;
 }
 
-/// Offset of the end of the whole records. Sets closed_cleanly if DataEnd follows.
+/// Collects all records and returns the offset of the end of the whole records. Sets closed_cleanly
+/// if DataEnd follows.
 std::uint64_t collect_records(ByteWindow& file, const std::function<bool()>& stopped,
                               ContentsCollector& collector) {
   LooseRecords loose(file, collector);
@@ -213,7 +214,7 @@ std::uint64_t collect_records(ByteWindow& file, const std::function<bool()>& sto
   return at;
 }
 
-/// `why`: why the file has no usable indexes; nullopt if it does not need them.
+/// `why`: the reason why the file has no usable indexes; nullopt if it does not need indexes.
 void collect_by_scan(ByteWindow& file, std::optional<mcap::SummaryError> why,
                      const std::function<bool()>& stopped, ContentsCollector& collector) {
   // The recording ends with the magic, so it was closed: if the records do not continue to this
@@ -236,7 +237,7 @@ void collect_by_scan(ByteWindow& file, std::optional<mcap::SummaryError> why,
   }
 }
 
-// --- both
+// --- Both ways
 
 /// The summary of the file. Its views are into `bytes`.
 tl::expected<mcap::Summary, mcap::SummaryError> summary_of(const RecordedBytes& file,

@@ -23,7 +23,7 @@ std::uint64_t free_bytes_from(const struct statvfs& fs) noexcept {
 }
 
 /// Makes the directory entry of `file` durable: a created or renamed file survives a power cut only
-/// once its directory is on the disk.
+/// after its directory was written to the disk.
 tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file) {
   const std::filesystem::path directory = file.has_parent_path() ? file.parent_path() : ".";
   const int fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -38,8 +38,8 @@ tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file)
 int rename_to_new(const std::filesystem::path& from, const std::filesystem::path& to) noexcept {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
-  // Here the file system has no RENAME_NOREPLACE. A plain rename is safe, because the recorder
-  // checked that `to` did not exist when the recording began.
+  // This file system has no RENAME_NOREPLACE. A plain rename is safe, because the recorder checked
+  // that `to` did not exist when the recording began.
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }
 
@@ -134,7 +134,7 @@ tl::expected<void, IoFault> RecordingFile::sync() {
 
 std::filesystem::path RecordingFile::finished_path() const {
   auto finished = path_;
-  finished.replace_extension();  // .part
+  finished.replace_extension();  // removes .part
   if (damaged_ && finished.stem().extension() != ".damaged")
     finished.replace_extension(".damaged.mcap");
   return finished;
@@ -149,7 +149,8 @@ void RecordingFile::mark_damaged() {
 
 tl::expected<void, IoFault> RecordingFile::finish() {
   if (!is_open()) return {};
-  // Nothing may follow the last magic: removes a truncated piece that append() could not cut back.
+  // After the last magic no bytes may follow: removes a truncated piece that append() could not
+  // remove.
   if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0)
     return unexpected(io_fault("truncate", path_, errno));
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The file that a Recorder writes: whole pieces are appended, and the hash of its contents is
-/// kept.
+/// The file that a Recorder writes. Only whole pieces are appended, and the hash of the contents is
+/// updated.
 
 #include <cstdint>
 #include <filesystem>

@@ -32,8 +32,8 @@ bool parse(std::string_view text, T& value) {
   return error == std::errc{} && end == text.data() + text.size();
 }
 
-/// The description of the recording; nullopt if `contents` has not the metadata of a recording of
-/// abbe.
+/// The description of the recording; nullopt if `contents` does not have the metadata of a
+/// recording of abbe.
 std::optional<RecordingInfo> info_of(const Contents& contents) {
   const auto text = [&](std::string_view record, std::string_view key) -> std::string {
     const auto entries = contents.metadata.find(std::string(record));
@@ -116,7 +116,7 @@ bool deliver(const RecordedMessage& message, const RecordingSink& sink) {
   return true;
 }
 
-// --- the file
+// --- The file
 
 struct RecordingReader::State {
   std::unique_ptr<recording::RecordedBytes> file;
@@ -248,7 +248,7 @@ std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
   return undecodable;
 }
 
-// --- messages by time
+// --- Messages by time
 
 /// Position in the messages of all chunks. Chunks overlap in time, because the recorder writes one
 /// stream after the other. The cursor opens chunks in file order and delivers a message once no
@@ -256,22 +256,22 @@ std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
 struct RecordingReader::Cursor::State {
   struct OpenChunk {
     std::vector<std::byte> bytes;
-    std::uint64_t left = 0;  ///< messages that are not delivered
+    std::uint64_t left = 0;  ///< number of messages that are not delivered yet
   };
   struct OpenMessage {
     mcap::Message message;  ///< views into the bytes of the chunk
-    std::uint64_t number;   ///< in the order of recording
+    std::uint64_t number;   ///< number in the order of recording
     std::list<OpenChunk>::iterator chunk;
   };
 
   const RecordingReader::State* recording = nullptr;
   std::size_t next_chunk = 0;
   std::list<OpenChunk> chunks;
-  std::vector<std::byte> spare;   ///< memory of a chunk that is delivered
-  std::vector<OpenMessage> open;  ///< messages of opened chunks, by time
+  std::vector<std::byte> spare;   ///< memory of a chunk whose messages are delivered; it is reused
+  std::vector<OpenMessage> open;  ///< messages of opened chunks, ordered by time
   std::size_t given = 0;          ///< the first `given` messages of `open` are delivered
   std::uint64_t given_in_all = 0, opened_in_all = 0;
-  std::map<std::uint16_t, std::uint64_t> latest_ns;  ///< by channel
+  std::map<std::uint16_t, std::uint64_t> latest_ns;  ///< time of the latest message, by channel
 
   [[nodiscard]] bool must_open_chunk() const {
     const auto& all = recording->contents.chunks;

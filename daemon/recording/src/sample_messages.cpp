@@ -21,7 +21,7 @@ using Axes = std::array<double, protocol::kMaxAxes>;
 std::ptrdiff_t axes_of(std::uint8_t axis_count) {
   return std::min<std::ptrdiff_t>(axis_count, protocol::kMaxAxes);
 }
-/// Copies as many values as `from` has; the remaining elements of `to` are not changed (zero in a
+/// Copies all values of `from`; the remaining elements of `to` are not changed (they are zero in a
 /// new sample).
 void copy(const std::vector<double>& from, Axes& to) {
   std::copy_n(from.begin(), std::min(from.size(), to.size()), to.begin());

@@ -8,7 +8,8 @@
 
 namespace abbe::daemon::recording {
 
-/// Fill an existing message, so that the memory of its strings and sequences is reused.
+/// The fill() functions write into an existing message, so that the memory of its strings and
+/// sequences is reused.
 void fill(v1::TrackerPoint& message, const protocol::TrackerPoint& point, std::string_view device);
 void fill(v1::AxisSample& message, const protocol::AxisSample& sample, std::string_view device);
 void fill(v1::ProbeTrigger& message, const protocol::ProbeTrigger& touch, std::string_view device);
@@ -30,8 +31,8 @@ void mark_gap(Message& message, std::uint32_t lost) {
     message.lost_before(message.lost_before() + lost);
 }
 
-/// Messages that are missing before `message`; `marked` is what mark_gap() has added. It counts
-/// alone for the kinds of messages that have no field lost_before.
+/// Number of messages that are missing before `message`. `marked`: the number that mark_gap() has
+/// added; it is the result for kinds of messages that have no field lost_before.
 template <class Message>
 [[nodiscard]] std::uint32_t lost_before(const Message& message, std::uint32_t marked) {
   if constexpr (requires { message.lost_before(); })

@@ -73,7 +73,7 @@ std::vector<ReplayedZero> MarkSearch::compared(const RecordingReader& recording)
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kZeroName) continue;
     const auto live = zero_from_attachment(attachment);
-    if (live && live->from < begun) continue;  // found in an earlier file
+    if (live && live->from < begun) continue;  // this zero was found in an earlier file
     for (std::size_t i = 0; live && i < axes_.size(); ++i) {
       if (options_.axes[i].live_axis != live->axis) continue;
       ReplayedZero& zero = all.emplace_back();

@@ -24,13 +24,14 @@ class MarkSearch {
   /// devices delivered them.
   void take(const Batch& batch);
 
-  /// The zeros that the live run found, in their order, each with the value that the replay found.
+  /// The zeros that the live run found, in the same order, each with the value that the replay
+  /// found.
   [[nodiscard]] std::vector<ReplayedZero> compared(const RecordingReader& recording) const;
 
  private:
   struct Axis {
     bool found = false;
-    std::vector<double> readings;  ///< reading at count 0, each time the marks were found
+    std::vector<double> readings;  ///< readings at count 0, one for each time the marks were found
   };
 
   explicit MarkSearch(const Config& config);

@@ -159,9 +159,9 @@ Result<AxisZeros> zero_of(const RecordingReader& recording, const Config& config
   return zero;
 }
 
-/// For a counter card that was set up while one recording file was written and whose first sample
-/// is in the next file. The raw bytes in the next file do not show this restart of the counters,
-/// but the recorded live samples do.
+/// Corrects the zero in a special case: a counter card was set up while one recording file was
+/// written, and its first sample is in the next file. The raw bytes in the next file do not show
+/// this restart of the counters, but the recorded live samples do.
 class SetUpBefore {
  public:
   explicit SetUpBefore(const RecordingReader& recording)
@@ -172,8 +172,8 @@ class SetUpBefore {
   void take_live(const protocol::SampleHead& head) {
     if (has(head.flags, protocol::SampleFlag::Restarted)) at_ = head.time;
   }
-  /// Applies the restart, if a live sample had one that the bytes do not show. Call it before
-  /// `zero` is applied to the samples decoded from the bytes.
+  /// Applies the restart of the counters if a live sample shows it and the bytes do not. Call it
+  /// before `zero` is applied to the samples decoded from the bytes.
   void apply(const Batch& batch, AxisZeros& zero) {
     const bool seen = std::ranges::any_of(batch.axes, [](const auto& s) {
       return has(s.head.flags, protocol::SampleFlag::Restarted);
@@ -217,7 +217,8 @@ class Pace {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// What the live run got besides samples, from the attachments of the recording.
+/// The data that the live run received in addition to samples, from the attachments of the
+/// recording.
 struct Attached {
   std::vector<CalibrationRequest> requests;
   AxisZeros zero;
@@ -246,7 +247,8 @@ std::optional<CountingProgress> left_progress(const RecordingReader& recording) 
   return std::nullopt;
 }
 
-/// As the live run decoded its bytes.
+/// The configuration for decoding the bytes. It is changed so that old recordings are decoded as in
+/// their live run.
 Config config_of_bytes(const RecordingReader& recording, Config config) {
   auto& encoder = config.of<EncoderConfig>();
   if (encoder && !has_rule(recording, kRotaryTravelRule))
@@ -254,7 +256,8 @@ Config config_of_bytes(const RecordingReader& recording, Config config) {
   return config;
 }
 
-/// Decodes samples from raw bytes and delivers each in the cycle in which the live run had it.
+/// Decodes samples from raw bytes and delivers each sample in the cycle in which the live run
+/// received it.
 class FromBytes {
  public:
   FromBytes(const RecordingReader& recording, const Config& config)
@@ -294,7 +297,7 @@ class FromBytes {
     cycles.expect(sample.head.time, next_->taken);
   }
 
-  Config config_;  // of decoder_
+  Config config_;  // configuration of decoder_
   RawDecoder decoder_;
   RecordingReader::Cursor ahead_;
   std::optional<RecordedMessage> next_;
@@ -305,14 +308,15 @@ class FromBytes {
   LiveCycles<protocol::EnvironmentSample> weather_;
 };
 
-/// Earlier versions of abbe used the readings of sensors without checking them.
+/// Options of the assembler. For recordings of earlier versions of abbe, which used readings of
+/// sensors without checks, the checks are switched off.
 AssemblerOptions assembling(const RecordingReader& recording, const Config& config) {
   auto options = assembler_options(config);
   if (!has_rule(recording, kSensorRule)) options.environment.sensors = {};
   return options;
 }
 
-/// Gives the pipeline the batches of the live run, cycle by cycle.
+/// Passes the batches of the live run to the pipeline, cycle by cycle.
 class Replay : private PipelineObserver {
  public:
   Replay(const RecordingReader& recording, const Config& config, const ReplayOptions& options,
@@ -339,8 +343,8 @@ class Replay : private PipelineObserver {
   Replay(const Replay&) = delete;
   Replay& operator=(const Replay&) = delete;
 
-  /// A file begins with the state of the sensors at the end of the previous one, or of an earlier
-  /// run.
+  /// Sets the state of the sensors at the beginning of the file: that at the end of the previous
+  /// file, or that of an earlier run.
   [[nodiscard]] Result<void> go_on() {
     for (const auto& attachment : recording_.attachments()) {
       if (attachment.name == kSensorStateName) {
@@ -458,7 +462,7 @@ class Replay : private PipelineObserver {
   std::optional<SecondSamples> second_samples_;
   RecordingSink sink_;
   HostTime begin_{};
-  HostTime published_{};  ///< of the message being delivered
+  HostTime published_{};  ///< publishing time of the message that is being delivered
   Batch batch_;
   ReplayReport report_;
 };

@@ -15,7 +15,7 @@ namespace abbe::daemon {
 
 class SecondSamples {
  public:
-  /// `recording` must outlive it.
+  /// `recording` must outlive this object.
   explicit SecondSamples(const RecordingReader& recording);
   SecondSamples(const SecondSamples&) = delete;
   SecondSamples& operator=(const SecondSamples&) = delete;

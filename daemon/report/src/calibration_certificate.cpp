@@ -15,7 +15,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// Entries without which a certificate is not valid.
+/// The missing entries, without which a certificate is not valid.
 std::vector<std::string> missing_entries(const ReportSubject& subject,
                                          const ReportSubject* as_left) {
   const CertificateDetails& d = subject.details;
@@ -94,7 +94,7 @@ void write_people(XmlText& out, const CertificateDetails& d) {
   write_contact(out, "dcc:customer", d.customer);
 }
 
-/// What the certificate states about the use of its models, first of all.
+/// The first statements of the certificate: the restrictions on the use of its models.
 Result<std::vector<std::string>> use_of(const ReportSubject& subject, const char* state) {
   return statements_of_use(
       fmt::format("certificate of model {} ({})", model_id(subject.document), state),

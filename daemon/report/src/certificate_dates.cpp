@@ -33,7 +33,8 @@ bool has_only_dates(const CertificateDetails& d) {
                              [](const std::string& date) { return date.empty() || is_date(date); });
 }
 
-/// Dates of the details that no time zone makes agree with the measurement of the model.
+/// Adds the dates of the details that cannot agree with the measurement of the model in any time
+/// zone.
 void compare_with_model(const CertificateDetails& d, const ReportSubject& subject,
                         std::string_view state, std::vector<std::string>& wrong) {
   const auto measured = measured_of(subject.document);
@@ -47,7 +48,7 @@ void compare_with_model(const CertificateDetails& d, const ReportSubject& subjec
                                 state, day_of(last)));
 }
 
-/// A measurement cannot end after the model was identified.
+/// Adds a measurement that ends after the model was identified.
 void compare_with_identification(const CertificateDetails& d, const ReportSubject& subject,
                                  bool is_last, std::vector<std::string>& wrong) {
   const protocol::UtcTime created = subject.document.created;
@@ -61,7 +62,7 @@ void compare_with_identification(const CertificateDetails& d, const ReportSubjec
   if (is_last) require(d.end_date, "end_date");
 }
 
-/// Times of the model alone that contradict each other, or the present time `now`.
+/// Adds the times of the model that contradict each other or are later than the present time `now`.
 void compare_clocks(const ModelDocument& document, const std::optional<protocol::UtcTime>& now,
                     std::vector<std::string>& wrong) {
   const protocol::UtcTime created = document.created;
@@ -78,7 +79,7 @@ void compare_clocks(const ModelDocument& document, const std::optional<protocol:
                     model_id(document), to_seconds(created), to_seconds(*now)));
 }
 
-/// Dates after the present day.
+/// Adds the dates that are later than the present day.
 void compare_with_today(const CertificateDetails& d, std::vector<std::string>& wrong) {
   if (d.now && d.issue_date > day_of(*d.now + kMostAheadOfUtc))
     wrong.push_back(fmt::format("certificate.issue_date: {} is in the future, today is {} (UTC)",
@@ -93,7 +94,8 @@ void compare_measurements(const ReportSubject& as_found, const ReportSubject& as
                                 when_in_words(as_left.document), to_seconds((*found)[1])));
 }
 
-/// `state`: "the measurement", "as left"; `ended`: its last day, empty: not known.
+/// Adds equipment whose calibration was no longer valid. `state`: text for the message, "the
+/// measurement" or "as left"; `ended`: last day of the measurement, empty: not known.
 void compare_equipment(const std::vector<EquipmentDetails>& equipment, EquipmentUse use,
                        std::string_view state, const std::string& ended,
                        std::vector<std::string>& wrong) {

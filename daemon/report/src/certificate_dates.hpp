@@ -1,7 +1,7 @@
 #pragma once
-/// Days of a certificate: of its measurements and of its issue. Days are texts as in ISO 8601,
-/// "2026-11-26", and are ordered as texts. Those of the details are local days, those of the models
-/// UTC.
+/// Days in a certificate: of its measurements and of its issue. A day is a text as in ISO 8601,
+/// "2026-11-26"; texts are compared to order days. Days from the details are local days, days from
+/// the models are UTC.
 
 #include <string>
 #include <vector>
@@ -10,11 +10,11 @@
 
 namespace abbe::daemon {
 
-/// "2024-05-17", UTC
+/// The day of a time in UTC: "2024-05-17".
 [[nodiscard]] std::string day_of(protocol::UtcTime time);
 
-/// First and last day of all measurements of a certificate: those of the details, else those of the
-/// models. Empty: not known.
+/// First and last day of all measurements of a certificate, from the details, or from the models if
+/// the details do not state them. Empty: not known.
 struct MeasurementDays {
   std::string begin, end;
 };
@@ -23,8 +23,8 @@ struct MeasurementDays {
 [[nodiscard]] MeasurementDays measurement_days(const ReportSubject& as_found,
                                                const ReportSubject* as_left);
 
-/// Days that are missing, and contradictory_dates(), and equipment whose calibration was not valid
-/// any more.
+/// The faults of all days: missing days, contradictory_dates(), and equipment whose calibration was
+/// no longer valid.
 [[nodiscard]] std::vector<std::string> wrong_dates(const ReportSubject& as_found,
                                                    const ReportSubject* as_left);
 

@@ -7,7 +7,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// -1 unless all characters are digits.
+/// The number in `digits`; -1 unless all characters are digits.
 int number_of(std::string_view digits) {
   int number = -1;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
@@ -21,7 +21,7 @@ bool is_date(std::string_view text) {
   if (text.size() != 10 || text[4] != '-' || text[7] != '-') return false;
   const int year = number_of(text.substr(0, 4)), month = number_of(text.substr(5, 2)),
             day = number_of(text.substr(8, 2));
-  if (year < 1 || month < 0 || day < 0) return false;  // xs:date has no year 0
+  if (year < 1 || month < 0 || day < 0) return false;  // the type xs:date has no year 0
   return std::chrono::year_month_day{std::chrono::year{year},
                                      std::chrono::month{static_cast<unsigned>(month)},
                                      std::chrono::day{static_cast<unsigned>(day)}}

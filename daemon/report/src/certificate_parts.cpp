@@ -17,7 +17,7 @@ void write_contents(XmlText& out, std::string_view element, const std::vector<st
   out.close();
 }
 
-/// si:real; without uncertainty if `U` is empty.
+/// Writes an si:real; without uncertainty if `U` is empty.
 void write_real(XmlText& out, std::string_view label, std::string_view value, std::string_view unit,
                 std::string_view U) {
   out.open("si:real");
@@ -62,7 +62,8 @@ void write_values(XmlText& out, const CertifiedValues& values) {
   out.close();
 }
 
-/// `name`, `description` and the status of a condition; to be closed after its data.
+/// Writes `name`, `description` and the status of a condition. The caller closes the element after
+/// its data.
 void open_condition(XmlText& out, std::string_view name, std::string_view description,
                     State state) {
   out.open("dcc:influenceCondition");
@@ -93,7 +94,7 @@ void write_state(XmlText& out, const ReportSubject& subject, State state) {
   out.close();
 }
 
-/// The details state the conditions of the measurement as found.
+/// Writes the conditions. The details state only those of the measurement as found.
 void write_conditions(XmlText& out, const ReportSubject& subject, State state,
                       const CertificateDetails& details) {
   out.open("dcc:influenceConditions");
@@ -104,7 +105,7 @@ void write_conditions(XmlText& out, const ReportSubject& subject, State state,
   out.close();
 }
 
-/// "certificate D-K-1, valid until 2027-03-31"
+/// The certificate of an instrument: "certificate D-K-1, valid until 2027-03-31".
 std::string calibration_of(const EquipmentDetails& e) {
   std::string text = xml_text(e.certificate).empty() ? "" : "certificate " + e.certificate;
   if (!e.valid_until.empty())
@@ -153,7 +154,7 @@ void write_method(XmlText& out, const ModelDocument& document) {
   out.close();
 }
 
-/// Verdict, model and inputs.
+/// Writes verdict, model and inputs.
 void write_meta_data(XmlText& out, const ReportSubject& subject) {
   const VerdictInWords verdict = verdict_in_words(subject);
   std::vector<std::string> texts{verdict.text};

@@ -8,16 +8,16 @@ namespace abbe::daemon {
 
 enum class State { AsFound, AsLeft };
 
-/// dcc:name with the text.
+/// Writes dcc:name with the text.
 void write_name(XmlText& out, std::string_view text);
 void write_identification(XmlText& out, std::string_view issuer, std::string_view value,
                           std::string_view name);
 void write_contact(XmlText& out, std::string_view element, const Contact& contact);
-/// abbe with this release; an empty one is that of this program.
+/// Writes abbe as software, with this release; an empty text means the release of this program.
 void write_software(XmlText& out, std::string_view release);
-/// dcc:statement with one paragraph for each text.
+/// Writes dcc:statement with one paragraph for each text.
 void write_statement(XmlText& out, std::string_view name, const std::vector<std::string>& texts);
-/// dcc:measurementResult: methods, software, equipment, conditions, all values.
+/// Writes dcc:measurementResult: methods, software, equipment, conditions, all values.
 void write_measurement_result(XmlText& out, const ReportSubject& subject,
                               const CertifiedValues& values, State state,
                               const CertificateDetails& details);

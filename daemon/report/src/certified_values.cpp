@@ -22,12 +22,12 @@ constexpr std::string_view kUndetermined =
     "the path does not determine the backlash: an axis moved in one direction only, or on too few "
     "legs";
 constexpr std::string_view kNotInModel = "the model has no table for it, or too few nodes";
-/// Explains U of ranges and of largest values.
+/// Explains the U of ranges and of largest values.
 constexpr std::string_view kOfRanges =
     "Noise of the measurement makes a range larger; U contains this. A range that is not several "
     "times as large as its U is an upper limit.";
 
-/// Decimals with which a number has two significant digits, 0 to 4; 3 for 0.
+/// Number of decimals, 0 to 4, with which `number` has two significant digits; 3 for 0.
 int decimals_of(double number) {
   if (!(number > 0.0)) return 3;
   return std::clamp(1 - static_cast<int>(std::floor(std::log10(number))), 0, 4);
@@ -61,7 +61,7 @@ CertifiedValue certified(std::string key, std::string name, const Value& value, 
           .u_si = value.u};
 }
 
-/// `U_m`: determines the number of decimals.
+/// A value without uncertainty. `U_m` determines only the number of decimals.
 CertifiedValue without_u(std::string key, std::string name, double length_m, double U_m) {
   return {.key = std::move(key),
           .name = std::move(name),
@@ -69,7 +69,7 @@ CertifiedValue without_u(std::string key, std::string name, double length_m, dou
           .value_si = length_m};
 }
 
-/// Values that need both directions of travel. `why`: why there are none.
+/// A value that needs both directions of travel. `why`: reason for the text if there is no value.
 CertifiedValue of_both_directions(std::string key, std::string name,
                                   const std::optional<Value>& value, std::string_view why) {
   if (value) return certified(std::move(key), std::move(name), *value, false);

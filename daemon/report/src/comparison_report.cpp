@@ -19,7 +19,7 @@ struct Sides {
   CertifiedValues values_a, values_b;
 };
 
-/// Nodes of both models that are in both validity volumes.
+/// The nodes of both models that are inside both validity volumes.
 std::vector<calib::Vector3> nodes_of_both(const calib::VolumetricModel& a,
                                           const calib::VolumetricModel& b) {
   std::vector<calib::Vector3> points_m;
@@ -29,7 +29,8 @@ std::vector<calib::Vector3> nodes_of_both(const calib::VolumetricModel& a,
   return points_m;
 }
 
-/// A tool for which both are valid, preferably of A; the first tool of A if there is none.
+/// A tool offset for which both models are valid, preferably one of A. If there is none, the first
+/// tool offset of A.
 calib::Vector3 common_tool_m(const calib::VolumetricModel& a, const calib::VolumetricModel& b) {
   for (const auto* model : {&a, &b})
     for (const calib::Vector3& tool_m : model->tool_offsets_m())
@@ -44,7 +45,8 @@ const CertifiedValue* value_named(const CertifiedValues& values, const std::stri
   return nullptr;
 }
 
-/// "B - A, with U of the difference if both are independent"; empty if one of them is missing.
+/// Text with the value "B - A" and the U of the difference, for independent models; empty if one of
+/// the values is missing.
 std::string difference_text(const CertifiedValue& a, const CertifiedValue* b) {
   if (b == nullptr || a.value.empty() || b->value.empty()) return {};
   const double scale = a.is_angle ? kUradPerRad : kUmPerM;

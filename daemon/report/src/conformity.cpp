@@ -20,7 +20,7 @@ const CertifiedValue* find(const CertifiedValues& values, std::string_view key) 
   return nullptr;
 }
 
-/// U(V), the bound of what is left.
+/// True for the values U(V), which are the bound of the error left after compensation.
 bool bounds_the_rest(const CertifiedValue& value) {
   return value.key == "U.max" || value.key == "U.rigid-free.max";
 }
@@ -37,7 +37,8 @@ std::string keys_that_can_be_judged(const CertifiedValues& values) {
   return keys;
 }
 
-/// "EYX", "EC0Y": an error of ISO 230-1. Its unit follows from its second letter.
+/// True for the name of an error of ISO 230-1: "EYX", "EC0Y". Its second letter determines its
+/// unit.
 bool is_error_name(std::string_view key) {
   const auto any_of = [key](std::size_t i, std::string_view letters) {
     return letters.find(key[i]) != std::string_view::npos;
@@ -46,7 +47,8 @@ bool is_error_name(std::string_view key) {
   return key.size() == 4 && key[0] == 'E' && any_of(1, "ABC") && key[2] == '0' && any_of(3, "XYZ");
 }
 
-/// An error that the model does not have: with one tool offset not all can be distinguished.
+/// The value of an error that the model does not have: with a single tool offset, not all errors
+/// can be distinguished.
 CertifiedValue not_in_model(const std::string& key) {
   return {.key = key,
           .name = key,
@@ -54,7 +56,7 @@ CertifiedValue not_in_model(const std::string& key) {
           .why = "the measurement does not distinguish it from the other errors"};
 }
 
-/// Why the limit cannot be judged.
+/// The reason why the limit cannot be judged; nullopt: it can be judged.
 std::optional<std::string> fault_of(const CertifiedValue* value, const ToleranceDetails& limit) {
   if (value == nullptr) return "the model has no such value";
   if (!can_be_judged(*value)) return "it has no uncertainty";

@@ -55,7 +55,7 @@ Curve outline(const Histogram::Series& series, const Bins& bins) {
   return out;
 }
 
-/// Expected counts n (Phi(b / sd) - Phi(a / sd)) of the intervals [a, b], at their middles.
+/// Expected counts n (Phi(b / sd) - Phi(a / sd)) of the intervals [a, b], drawn at their middles.
 Curve normal_curve(std::size_t n, double sd, const Bins& bins) {
   const auto below = [sd](double x) { return 0.5 * std::erfc(-x / (sd * std::numbers::sqrt2)); };
   Curve out{.name = "normal distribution", .x = {}, .y = {}, .dot_every = 0};

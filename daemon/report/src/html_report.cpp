@@ -10,7 +10,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// The page is as wide as the printed one, so that charts need no other size in print.
+/// The page is as wide as a printed page, so that charts have the same size in print.
 constexpr std::string_view kStyle =
     "@page{size:A4;margin:12mm 10mm 15mm;@bottom-right{content:'page 'counter(page)' of '"
     "counter(pages);font:8.5pt sans-serif;width:30mm}}"
@@ -41,7 +41,7 @@ constexpr std::string_view kStyle =
     ".signal{font-size:1rem}.front .signal svg{width:6mm;height:16mm}"
     ".front .columns th{white-space:nowrap}"
     ".maps.drawing{width:120mm}"
-    // So that the report of a model has at most 8 pages.
+    // The print style keeps the report of a model to at most 8 pages.
     "@media print{h1{margin:.3rem 0}h2{margin:.7rem 0 .2rem;font-size:1rem}p{margin:.2rem 0}"
     "table{margin:.25rem 0}.maps{width:140mm;margin:.3rem 0}.front .maps{width:190mm}"
     ".plot{width:72mm}.plot.wide{width:146mm}.maps.drawing{width:80mm}"
@@ -51,8 +51,8 @@ constexpr std::string_view kStyle =
 constexpr std::string_view kFooter =
     "@page{{@bottom-left{{content:'{}';font:8.5pt sans-serif;white-space:nowrap}}}}";
 
-/// The text of a CSS string: all but letters, digits and spaces by their number.
-/// Bytes beyond ASCII are left: they end no string.
+/// The text as a CSS string: all characters except letters, digits and spaces are written by their
+/// number. Bytes beyond ASCII are not changed, because they cannot end a string.
 std::string in_style_sheet(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -63,7 +63,8 @@ std::string in_style_sheet(std::string_view text) {
   return out;
 }
 
-/// A cell of a table. A long word, as a hash, may be broken; a number never is.
+/// A cell of a table. A long word, such as a hash, may be broken into lines; a number is never
+/// broken.
 std::string cell(std::string_view text) {
   constexpr std::size_t kLongestWord = 40;
   std::size_t length = 0;

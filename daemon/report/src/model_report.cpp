@@ -29,7 +29,7 @@ void add_fit(HtmlReport& page, const ModelDocument& document) {
              {row("before the fit", s.before), row("after", s.after)});
 }
 
-/// What was not used in the fit, before and after.
+/// Adds the rms of the held-out observations before and after compensation.
 void add_held_out(HtmlReport& page, const RunFigures& run) {
   if (run.held_out_before_m > 0.0)
     page.facts(
@@ -38,7 +38,7 @@ void add_held_out(HtmlReport& page, const RunFigures& run) {
          {"with the model", um_text(run.held_out_after_m, 3) + " rms"}});
 }
 
-/// The path or the places of the artefact, in the box of the model and around it.
+/// Adds a drawing of the path or of the places of the artefact, with the box of the model.
 void add_places(HtmlReport& page, const ModelDocument& document, const calib::iso::LineBox& box) {
   page.heading("Where was measured");
   if (!document.run || document.run->places_m.empty()) {
@@ -64,7 +64,7 @@ void add_places(HtmlReport& page, const ModelDocument& document, const calib::is
   page.drawing(drawing);
 }
 
-/// Tables as curves, or coefficients.
+/// Adds the tables as curves, or the coefficients of a polynomial model.
 void add_parameters(HtmlReport& page, const calib::VolumetricModel& model) {
   if (model.tables() != nullptr) {
     page.heading("Error motions: tables of the model");

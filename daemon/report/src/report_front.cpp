@@ -59,7 +59,8 @@ void add_identity(HtmlReport& page, const ReportSubject& subject) {
       "certificate.toml.");
 }
 
-/// Of positioning and straightness the largest range of a mean, "X: EYX ...".
+/// Of positioning and straightness of all axes, the value with the largest range of the mean, "X:
+/// EYX ...".
 const CertifiedValue* worst_of_axes(const CertifiedValues& values) {
   const CertifiedValue* worst = nullptr;
   constexpr std::size_t kPositioning = 1, kStraightness = 2;
@@ -119,7 +120,7 @@ std::vector<std::vector<std::string>> rows_of(const std::vector<JudgedValue>& ju
 const std::vector<std::string> kColumns{"", "value \u00b1 U (k = 2)", "limit", "verdict"};
 constexpr std::size_t kMostLimits = 3;
 
-/// The limits that decide come first.
+/// Sorts the limits so that those that decide the result come first.
 void sort_by_verdict(std::vector<JudgedValue>& judged) {
   const auto rank = [](const JudgedValue& one) {
     return one.conformity == Conformity::Fail ? 0 : one.conformity == Conformity::Neither ? 1 : 2;

@@ -26,7 +26,7 @@ std::string contact_text(const Contact& contact) {
                  contact.email});
 }
 
-/// Who added the model to the store; empty for a file.
+/// The user who added the model to the store; empty for a file.
 std::string operator_of(const ReportSubject& subject) {
   for (const StoreEvent& event : subject.events)
     if (event.action == StoreAction::Added)
@@ -40,7 +40,8 @@ void add_conditions(Facts& facts, const ReportSubject& subject) {
   facts.emplace_back("tool offsets", tools_in_words(subject.document.model));
 }
 
-/// "tracker.reflector = A; tracker.weather = compute".
+/// The settings of the measuring devices as text: "tracker.reflector = A; tracker.weather =
+/// compute".
 std::string measured_with(const ModelDocument& document) {
   if (!document.configuration) return {};
   std::string text;

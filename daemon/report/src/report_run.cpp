@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kDecimals = 3;
 
-/// rms in intervals of the path, before and after.
+/// Adds the rms in intervals of the path, before and after compensation.
 void add_along_path(HtmlReport& page, const RunFigures& run) {
   if (run.residuals.empty()) return;
   Curve before{.name = "before", .x = {}, .y = {}, .dot_every = 0};
@@ -53,19 +53,20 @@ void add_series(HtmlReport& page, const RunFigures::Series& series) {
   page.paragraph(text + ".");
 }
 
-/// Standard deviation that the stated uncertainties predict for residuals in units of them: a fit
-/// with n observations and f degrees of freedom leaves sqrt(f / n). 0: no prediction.
+/// Standard deviation of (residual / its stated uncertainty) that the fit predicts: with n
+/// observations and f degrees of freedom it is sqrt(f / n). 0: no prediction.
 double predicted_sd(const ModelDocument& document) {
   const ModelStatistics& s = document.statistics;
   if (document.method == "evemu" || s.observations == 0) return 0.0;
   double freedom = s.degrees_of_freedom.value_or(0.0);
-  // In models of earlier versions the rank of a bar's model counts all unknowns with a prior.
+  // In models of earlier versions, the rank of a model from a bar counts all unknowns that have a
+  // prior.
   if (!s.degrees_of_freedom && document.method == "otf" && s.observations > s.rank)
     freedom = static_cast<double>(s.observations - s.rank);
   return freedom > 0.0 ? std::sqrt(freedom / static_cast<double>(s.observations)) : 0.0;
 }
 
-/// Counts beside those that the stated uncertainties predict.
+/// Adds a histogram of the residuals, and the counts that the stated uncertainties predict.
 void add_sigma_counts(HtmlReport& page, const RunFigures& run, const ModelDocument& document) {
   if (run.sigma_counts.empty()) return;
   constexpr double kMost = RunFigures::kMostSigmas;
@@ -126,7 +127,7 @@ std::vector<std::string> row_of(const RunFigures::Part& part) {
                       : "not recorded"};
 }
 
-/// Of many parts those with the largest residuals.
+/// Adds a table of the parts of the run; of many parts, those with the largest residuals.
 void add_table_of_parts(HtmlReport& page, const RunFigures& run) {
   constexpr std::size_t kShown = 24;
   std::vector<const RunFigures::Part*> parts;

@@ -20,7 +20,7 @@ Result<ReportSubject> report_subject(const ModelStore& store, const std::string&
   ReportSubject subject{.document = std::move(stored->document),
                         .entry = std::move(stored->entry),
                         .events = std::move(stored->events)};
-  // A report is made also where the identity cannot be read.
+  // The report is also made if the identity cannot be read.
   subject.identity_doubt = identity_doubt(store, id, marks_of_this_computer());
   const auto identity = identity_of(store);
   if (!identity || !*identity) return subject;

@@ -112,7 +112,7 @@ void add_value_curves(HtmlReport& page, const CertifiedValues& values) {
 void add_field(HtmlReport& page, const calib::VolumetricModel& model,
                const calib::iso::LineBox& box) {
   constexpr int kPerSide = 4;
-  constexpr double kLongest = 0.12;  // of the diagonal of the box
+  constexpr double kLongest = 0.12;  // fraction of the diagonal of the box
   const calib::Vector3 step_m = (box.high_m - box.low_m) / (kPerSide - 1.0);
   const calib::Vector3 tool_m = model.tool_offsets_m().front();
   std::vector<std::pair<calib::Vector3, calib::Vector3>> vectors;

@@ -12,8 +12,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// Equipment whose calibration was not valid any more on the last day of the measurement; of a
-/// model that does not have this day, on the day of its identification.
+/// Adds equipment whose calibration was no longer valid on the last day of the measurement. If the
+/// model does not have this day, the day of its identification is used.
 void add_expired_equipment(const ReportSubject& subject, std::vector<std::string>& notes) {
   const std::string end = measurement_days(subject, nullptr).end;
   const std::string day = end.empty() ? day_of(subject.document.created) : end;
@@ -25,15 +25,15 @@ void add_expired_equipment(const ReportSubject& subject, std::vector<std::string
                       e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
 }
 
-/// What its user must know apart from the verdict, which is the first statement. Some of it is
-/// among the notes already.
+/// Adds the remarks that a user of the model must know. The verdict, which is the first statement,
+/// is left out. Some remarks may already be among the notes.
 void add_obstacles(const ReportSubject& subject, std::vector<std::string>& notes) {
   const auto found = obstacles_to_use(in_use(subject, ModelPurpose::Look)).statements;
   for (std::size_t i = 1; i < found.size(); ++i)
     if (std::ranges::find(notes, found[i]) == notes.end()) notes.push_back(found[i]);
 }
 
-/// What happened to the model in the store, apart from its verdict.
+/// The events of the model in the store, except its verdict.
 std::vector<std::string> notes_of(const ReportSubject& subject) {
   std::vector<std::string> notes;
   if (const auto& verdict = subject.document.verdict) notes = verdict->notes;
@@ -73,8 +73,8 @@ bool has_drifted(const ReportSubject& subject) {
   return !subject.events.empty() && subject.events.back().action == StoreAction::Drifted;
 }
 
-/// Those that together have at most so many characters, and at least one. Each takes at least the
-/// width of the page.
+/// The first items that together have at most `most` characters, but at least one item. Each item
+/// counts with at least the width of the page.
 std::vector<std::string> first_of(const std::vector<std::string>& items, std::size_t most) {
   constexpr std::size_t kLine = 100;
   std::vector<std::string> first;

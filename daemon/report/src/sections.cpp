@@ -27,7 +27,7 @@ std::string shortened(std::string text) {
   constexpr std::size_t kMost = 90;
   if (text.size() <= kMost) return text;
   std::size_t end = kMost;
-  // Not in the middle of a character of UTF-8.
+  // the text must not be cut within a UTF-8 character
   while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
   return text.substr(0, end) + " ...";
 }

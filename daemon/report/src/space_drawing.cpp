@@ -87,14 +87,15 @@ std::string frame(const View& view, const std::array<calib::Vector3, 2>& box_mm)
     const auto k = static_cast<Eigen::Index>(axis);
     calib::Vector3 middle = box_mm[0];
     middle(k) = 0.5 * (box_mm[0](k) + box_mm[1](k));
-    if (axis == 1) middle.x() = box_mm[1].x();  // the right edge, which nothing hides
+    // the right edge, because other lines do not hide it
+    if (axis == 1) middle.x() = box_mm[1].x();
     out += text_beside(view.at(middle), kBeside.at(axis).x, kBeside.at(axis).y,
                        std::string(1, "XYZ"[axis]));
   }
   return out;
 }
 
-/// Labels at the ends of the lines. Those that would cover each other become one.
+/// Labels at the ends of the lines. Labels that would cover each other are joined.
 class Labels {
  public:
   void add(PlanePoint at, const std::string& label) {

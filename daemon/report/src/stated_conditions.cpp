@@ -15,7 +15,7 @@ std::string celsius(double temperature_K) {
   return fmt::format("{:.2f}", temperature_K - kZeroCelsius_K);
 }
 
-/// Of the run; all absent in models of earlier versions.
+/// The conditions that the run recorded; all are absent in models of earlier versions.
 RunFigures::Conditions recorded(const ModelDocument& document) {
   return document.run && document.run->conditions ? *document.run->conditions
                                                   : RunFigures::Conditions{};
@@ -32,7 +32,7 @@ StatedCondition temperature(const ModelDocument& document, const CertificateDeta
                   d.u_temperature_K ? fmt::format("{:.2f}", 2.0 * *d.u_temperature_K) : ""}};
     return c;
   }
-  // Earlier versions wrote the temperature of the ball array there.
+  // For the ball array, earlier versions wrote the temperature of the array there.
   const auto range_K = recorded(document).temperature_K;
   if (!range_K || document.method == "evemu") return c;
   c.origin = "lowest and highest value of all sensors";
@@ -40,7 +40,7 @@ StatedCondition temperature(const ModelDocument& document, const CertificateDeta
   return c;
 }
 
-/// Of the ball array, or of the bar in its measurements.
+/// Adds the temperature of the ball array, or that of the bar in its measurements.
 void add_artefact(const ModelDocument& document, std::vector<StatedCondition>& all) {
   if (const auto& array = document.artefact) {
     StatedCondition c{.name = "temperature of the ball array", .unit = "C", .dsi_unit = kCelsius};

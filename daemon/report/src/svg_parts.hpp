@@ -1,5 +1,5 @@
 #pragma once
-/// Parts that the SVG figures have in common.
+/// Functions that the SVG figures share.
 
 #include <string>
 #include <string_view>
@@ -14,7 +14,7 @@ namespace abbe::daemon {
 [[nodiscard]] std::string text_at(double x, double y, std::string_view anchor,
                                   std::string_view text, std::string_view more = "");
 
-/// "-300", "0", "0.25"; a rounding error does not show.
+/// The text of a tick: "-300", "0", "0.25". Rounding errors are removed.
 [[nodiscard]] std::string tick_text(double value);
 
 }  // namespace abbe::daemon

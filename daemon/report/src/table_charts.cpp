@@ -64,7 +64,7 @@ Curve curve_of(const VolumetricModel& model, const calib::Table& table) {
   return curve;
 }
 
-/// Errors of one kind (rotations if `angles`, else translations) along one axis.
+/// A chart of the errors of one kind (rotations if `angles`, else translations) along one axis.
 LineChart table_chart(const VolumetricModel& model, Axis axis, bool angles) {
   LineChart chart{
       .title = fmt::format("{} of {}", angles ? "Angular errors" : "Positioning and straightness",

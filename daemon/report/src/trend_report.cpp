@@ -15,7 +15,7 @@ namespace {
 struct TrendPoint {
   const ReportSubject* subject = nullptr;
   CertifiedValues values;
-  double days = 0.0;  ///< since the first model
+  double days = 0.0;  ///< days since the first model
 };
 
 bool is_refused(const TrendPoint& point) {
@@ -82,8 +82,8 @@ std::string text_of_key(const CertifiedValues& values, std::string_view key) {
   return value != nullptr ? with_U(*value) : std::string();
 }
 
-/// To minutes: "2024-05-17T08:30", the end of the measurement; "identified 2024-05-17T08:30" if
-/// that is not recorded.
+/// The date to whole minutes: "2024-05-17T08:30", the end of the measurement, or "identified
+/// 2024-05-17T08:30" if this is not recorded.
 std::string date_in_table(const ModelDocument& document) {
   constexpr std::size_t kMinutes = 16;
   const std::string text = to_text(time_of(document)).substr(0, kMinutes);

@@ -16,7 +16,7 @@ namespace {
 // In units of the SVG's view box, which is as wide as the page.
 constexpr double kPage = 720.0, kLeft = 62.0, kRight = 76.0, kGap = 14.0;
 constexpr double kTop = 40.0, kBottom = 36.0, kBar = 12.0;
-constexpr double kFlattest = 0.35, kSteepest = 1.4;  // height per width of a map
+constexpr double kFlattest = 0.35, kSteepest = 1.4;  // limits of the ratio height / width of a map
 
 struct Colour {
   double red, green, blue;
@@ -30,7 +30,7 @@ constexpr std::array<Colour, 7> kScale{{{253, 231, 37},
                                         {68, 57, 131},
                                         {68, 1, 84}}};
 
-/// `share`: 0 to 1 of the scale.
+/// The colour for `share`, the position on the scale from 0 to 1.
 std::string colour_at(double share) {
   const double at = std::clamp(share, 0.0, 1.0) * static_cast<double>(kScale.size() - 1);
   const auto k = std::min(static_cast<std::size_t>(at), kScale.size() - 2);
@@ -44,7 +44,7 @@ std::string colour_at(double share) {
                      mixed(kScale[k].blue, kScale[k + 1].blue));
 }
 
-/// 0 without values.
+/// The largest value of all maps; 0 if there is none.
 double largest_value(const ValueMaps& maps) {
   double largest = 0.0;
   for (const ValueMap& map : maps.maps) {
@@ -56,7 +56,7 @@ double largest_value(const ValueMaps& maps) {
   return largest;
 }
 
-/// Where a map is drawn, and its scales.
+/// The place of a map on the page, and its scales.
 struct Frame {
   double left = 0.0, width = 0.0, height = 0.0;
   const ValueMap& map;
@@ -77,8 +77,8 @@ std::string rectangle(double left, double top, double width, double height,
                      left, top, width, height, attributes);
 }
 
-/// The cells with a value, on hatching. One area is hatched for all others: Chromium needs minutes
-/// to print hundreds.
+/// The cells that have a value, drawn over hatching. The hatching is one area for all other cells,
+/// because Chromium needs minutes to print hundreds of hatched areas.
 std::string cells(const Frame& frame, double largest) {
   const ValueMap& map = frame.map;
   const std::size_t columns = map.x_edges.size() - 1;
@@ -134,7 +134,7 @@ std::string scale_bar(double height, double largest, std::string_view label) {
   return out + text_at(left, kTop - 6.0, "start", label);
 }
 
-/// Height per width of the plane, within the limits of a readable map.
+/// Ratio height / width of the plane, within the limits of a readable map.
 double aspect(const ValueMap& map) {
   const double width = map.x_edges.back() - map.x_edges.front();
   const double height = map.y_edges.back() - map.y_edges.front();

@@ -31,7 +31,8 @@ std::vector<double> in_mm(const std::vector<double>& lengths_m) {
   return out;
 }
 
-/// Index of the interval between two edges that holds the value; that of the nearest one outside.
+/// Index of the interval between two edges that contains the value. For a value outside all
+/// intervals, the index of the nearest one.
 template <class Edges>
 std::size_t interval_of(const Edges& edges, double value) {
   const auto above = std::upper_bound(edges.begin() + 1, edges.end() - 1, value);
@@ -78,10 +79,10 @@ std::string summary(const ValueMaps& maps) {
 }
 
 struct ModelMaps {
-  ValueMaps V, U, misfit;  ///< misfit: the part of U(V) that it causes; not drawn
+  ValueMaps V, U, misfit;  ///< `misfit`: the part of U(V) that the misfit causes; it is not drawn
 };
 
-/// |V| and U(V) at the middles of the cells.
+/// The values of |V| and U(V) at the middles of the cells.
 ModelMaps maps_of(const calib::VolumetricModel& model) {
   const VolumeCuts cuts = volume_cuts(model.validity(), kMostCells);
   ModelMaps maps{empty_maps(cuts, "Before: error |V| of the machine without compensation", "um"),
@@ -119,7 +120,7 @@ std::size_t observations_of(Cells cells) {
   return count;
 }
 
-/// Of all observations in the cells.
+/// The rms over all observations in the cells.
 double rms(Cells cells, double RunFigures::HeldOutCell::*member) {
   double squares = 0.0;
   for (const RunFigures::HeldOutCell& cell : cells)
@@ -127,8 +128,8 @@ double rms(Cells cells, double RunFigures::HeldOutCell::*member) {
   return std::sqrt(squares / static_cast<double>(observations_of(cells)));
 }
 
-/// HeldOutCell::after_m in every cell of a slab. A cell that the map does not have, in a file that
-/// was changed, is left out.
+/// A map of HeldOutCell::after_m in every cell of a slab. A cell that the map does not have is left
+/// out; it occurs only if the file was changed.
 ValueMaps map_of(Cells cells, const calib::ValidityVolume& volume) {
   const VolumeCuts cuts = volume_cuts(volume, kMostCellsOfLeftErrors);
   ValueMaps maps = empty_maps(
@@ -170,7 +171,7 @@ VolumeCuts volume_cuts(const calib::ValidityVolume& volume, std::size_t most) {
   const Vector3 size = high - low;
 
   VolumeCuts cuts;
-  for (const Axis axis : {Axis::Y, Axis::X})  // of equal sides: Z
+  for (const Axis axis : {Axis::Y, Axis::X})  // of sides with equal length, Z is chosen
     if (component(size, axis) < component(size, cuts.across)) cuts.across = axis;
   cuts.x = cuts.across == Axis::X ? Axis::Y : Axis::X;
   cuts.y = cuts.across == Axis::Z ? Axis::Y : Axis::Z;
@@ -198,7 +199,7 @@ std::vector<RunFigures::HeldOutCell> held_out_cells(const calib::ValidityVolume&
   const std::size_t of_slab = columns * (cuts.y_edges_m.size() - 1);
   std::vector<RunFigures::HeldOutCell> all(3 * of_slab);
 
-  for (const LeftError& one : left) {  // sums of squares first
+  for (const LeftError& one : left) {  // the members first contain sums of squares
     const std::size_t slab =
         interval_of(cuts.slab_edges_m, component(one.axis_position_m, cuts.across));
     const std::size_t cell =
@@ -232,7 +233,8 @@ void add_before_and_after(HtmlReport& page, const calib::VolumetricModel& model,
   const std::string cut = maps.V.maps[kMiddle].title;
   ValueMaps picture = std::move(maps.V);
   picture.title = fmt::format("Error before and after compensation, {}", cut);
-  // A high volume is drawn narrower, so that the picture leaves space for the rest of the page.
+  // The maps of a high volume are drawn narrower, so that the picture leaves space for the rest of
+  // the page.
   const auto extent = [](const std::vector<double>& edges) { return edges.back() - edges.front(); };
   const ValueMap& first = picture.maps[kMiddle];
   picture.least_places = extent(first.y_edges) > extent(first.x_edges) ? 4 : 3;

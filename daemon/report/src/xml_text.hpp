@@ -1,5 +1,5 @@
 #pragma once
-/// A text of XML elements, indented.
+/// Builds the text of XML elements, indented.
 
 #include <initializer_list>
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace abbe::daemon {
 
-/// Any bytes as text for XML 1.0: escaped; what is not UTF-8 or not a character of XML is replaced
-/// by U+FFFD; white space at both ends is removed.
+/// Any bytes as text for XML 1.0. Special characters are escaped; bytes that are not UTF-8 and
+/// characters that XML does not allow are replaced by U+FFFD; white space at both ends is removed.
 [[nodiscard]] std::string xml_text(std::string_view text);
 
 class XmlText {
@@ -21,9 +21,9 @@ class XmlText {
   void open(std::string_view name, Attributes attributes = {});
   void close();
   void element(std::string_view name, std::string_view text);
-  /// Nothing for an empty text.
+  /// Writes the element; nothing for an empty text.
   void element_if(std::string_view name, std::string_view text);
-  /// Requires that every element is closed.
+  /// The whole text. Requires that every element is closed.
   [[nodiscard]] std::string finish() const { return text_; }
 
  private:

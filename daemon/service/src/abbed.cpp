@@ -45,18 +45,18 @@ namespace {
 using namespace std::chrono_literals;
 using WallTime = std::chrono::steady_clock::time_point;
 
-constexpr auto kNameServiceTimeout = 1s;  // at the start
+constexpr auto kNameServiceTimeout = 1s;  // for requests at the start
 constexpr int kHubHangs = number(ExitCode::Internal);
 
 }  // namespace
 
-// In the order of starting; destroyed in reverse.
+// The parts are in the order of starting; they are destroyed in reverse order.
 struct Abbed::State {
   Config config;
   AbbedOptions options;
   drivers::MonotonicTime time;
-  WallClock clock;          // first reading: the start of abbed
-  protocol::UtcOffset utc;  // of recordings and messages, constant
+  WallClock clock;          // its first reading is at the start of abbed
+  protocol::UtcOffset utc;  // offset for recordings and messages; constant
   std::vector<std::string> warnings;
   std::optional<drivers::CpuLatencyBound> cpu_latency;
   std::optional<ModelAuthority> authority;
@@ -95,7 +95,7 @@ struct Abbed::State {
   State& operator=(const State&) = delete;
   ~State() { (void)end(); }
 
-  /// The first call ends everything.
+  /// Ends all parts. Further calls do nothing.
   std::optional<drivers::IppStop> end() {
     if (std::exchange(has_ended, true)) return {};
     if (devices) devices->end_machine();  // first: the machine must stop even if a later step hangs
@@ -114,7 +114,7 @@ struct Abbed::State {
                     kLongestHubEnd.count(), kHubHangs, recording),
         &stop_machines_at_once};
     control.reset();
-    journal.reset();  // both call the hub a last time
+    journal.reset();  // both call the hub for the last time
 
     if (control_listener) ::unlink(config.control.socket.c_str());
     if (hub) hub->stop();
@@ -151,7 +151,8 @@ struct Abbed::State {
     return {};
   }
 
-  /// Nothing is refused: acquisition and recording do not need the identity.
+  /// Opens the identity of the machine. A failure does not stop the start, because acquisition and
+  /// recording do not need the identity.
   Result<void> open_machine_identity() {
     machine_identity.emplace(
         IdentityWatch::open(config.daemon.data_dir, marks_of_this_computer(), utc_now()));
@@ -171,8 +172,8 @@ struct Abbed::State {
     return dds.open(config, options, machine_identity->known().machine_id, utc, warnings);
   }
 
-  /// Called before start_devices(): a processor in a deep sleep state would delay the first time
-  /// stamps of the devices.
+  /// Limits the wake-up time of the processors. Called before start_devices(): a processor in a
+  /// deep sleep state would delay the first time stamps of the devices.
   Result<void> bound_cpu_latency() {
     if (!config.daemon.cpu_latency) return {};
     auto bound = drivers::CpuLatencyBound::request(*config.daemon.cpu_latency);
@@ -181,7 +182,7 @@ struct Abbed::State {
     return {};
   }
 
-  /// An error where real time is enforced, else a warning.
+  /// Handles a setting that the system refuses: an error if real time is enforced, else a warning.
   Result<void> refused_by_system(const Error& error) {
     if (config.daemon.realtime == RealTimeMode::Enforce) return tl::unexpected(error);
     warnings.push_back(error.text);
@@ -211,7 +212,8 @@ struct Abbed::State {
     auto listener = listen_unix(config.control.socket);
     ABBE_TRY(listener);
     control_listener = std::move(*listener);
-    // So that the first requests find the groups of a name service that answers in time.
+    // The groups are looked up now, so that the first requests find them if the name service
+    // answers in time.
     const std::array groups{config.control.look_group, config.control.change_group,
                             config.control.move_group};
     account_names().look_up(groups, kNameServiceTimeout);
@@ -290,7 +292,8 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   }
 
   using Step = Result<void> (State::*)();
-  // The recorder is the last step that can fail: repeated failed starts then leave no files.
+  // The recorder is the last step that can fail, so that repeated failed starts leave no recording
+  // files.
   for (const Step step :
        {&State::refuse_second_daemon, &State::open_models, &State::open_machine_identity,
         &State::open_dds, &State::bound_cpu_latency, &State::start_devices,

@@ -1,5 +1,5 @@
 #pragma once
-/// Options of the parts that abbed starts, as its configuration gives them. Pure functions.
+/// Makes the options of the parts that abbed starts from its configuration. Pure functions.
 
 #include <string>
 
@@ -11,7 +11,7 @@
 
 namespace abbe::daemon {
 
-/// `name`: of the recording, without folder and extension.
+/// `name`: name of the recording, without folder and extension.
 [[nodiscard]] RecorderThreadOptions recorder_options(const Config&, const std::string& name);
 
 [[nodiscard]] PublisherOptions publisher_options(const Config&);

@@ -37,7 +37,7 @@ void become_ordinary_thread() noexcept {
   const sched_param none{};
   (void)::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &none);
   cpu_set_t cpus;
-  if (::sched_getaffinity(::getpid(), sizeof cpus, &cpus) == 0)  // of the main thread
+  if (::sched_getaffinity(::getpid(), sizeof cpus, &cpus) == 0)  // the affinity of the main thread
     (void)::pthread_setaffinity_np(::pthread_self(), sizeof cpus, &cpus);
 }
 
@@ -63,7 +63,7 @@ class BackgroundThreads {
     dispatcher_.join();
   }
 
-  /// Any thread; takes no lock.
+  /// Runs the task. May be called from any thread; takes no lock.
   void run(BackgroundTask work) {
     mail_.put(std::move(work));
     come_.signal();
@@ -136,7 +136,7 @@ class BackgroundThreads {
   std::deque<BackgroundTask> waiting_;  // under mutex_
   std::size_t idle_ = 0;                // under mutex_: threads that wait
   bool ending_ = false;                 // under mutex_
-  std::vector<std::thread> threads_;    // the dispatcher's
+  std::vector<std::thread> threads_;    // the threads of the dispatcher
   const pid_t process_ = ::getpid();
   std::thread dispatcher_;
 };

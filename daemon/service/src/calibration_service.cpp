@@ -37,7 +37,7 @@ SessionVerdict session_verdict(const std::string& id, const calib::Verdict& verd
   return out;
 }
 
-/// The same in one line, for events.
+/// The verdict in one line, for events.
 std::string text_of(const SessionVerdict& verdict, bool accepted) {
   const std::string notes =
       verdict.notes.empty() ? "" : fmt::format("; {}", fmt::join(verdict.notes, "; "));
@@ -202,11 +202,12 @@ void CalibrationService::begin_identification(Acquisition acquired, HostTime now
       .who = session_.who()});
 }
 
-/// Reports to the session what the background task has reached, and stores a model again after an
+/// Reports the progress of the background task to the session, and stores a model again after an
 /// error.
 void CalibrationService::follow_background(HostTime now) {
   const bool task_ended = ready(task_);
-  // The cycle that raises DRIFT publishes it, before another model becomes active.
+  // If the task raises DRIFT, this cycle publishes it; a new model becomes active only in a later
+  // cycle.
   const bool drift_is_new = take_model(now) && !model_->beside.drift.empty();
   if (task_ended && !drift_is_new) conclude(outcome_of(task_), now);
   if (session_.stage() == SessionStage::NotStored && now >= session_.since() + kStoreAgain) {
@@ -216,8 +217,8 @@ void CalibrationService::follow_background(HostTime now) {
   report_stalled_store(now);
 }
 
-/// Takes the model once the task has begun to store it; true in this cycle.
-/// `revision_before_storing_` is the revision of the authority in the last cycle before that: an
+/// Takes the model once the task has begun to store it; returns true in that cycle.
+/// `revision_before_storing_` is the revision of the authority in the last cycle before that. An
 /// activation with a later revision may be newer than the one that the task makes.
 bool CalibrationService::take_model(HostTime now) {
   if (!task_.valid() || model_) return false;
@@ -248,8 +249,8 @@ void CalibrationService::discard_model() {
   destroy_in_background(std::exchange(model_, nullptr));
 }
 
-/// The command that identifies the run of the session again. The file loses the end ".part" when it
-/// is closed; abbe identify finds it by both names.
+/// The command that identifies the run of the session again. The file name loses ".part" when the
+/// file is closed; abbe identify finds the file by both names.
 std::string CalibrationService::identify_again() const {
   if (recorder_ == nullptr || recorder_->status().file.empty()) return {};
   std::error_code failed;

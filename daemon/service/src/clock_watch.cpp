@@ -22,7 +22,7 @@ void ClockWatch::cycle(Hub& hub) {
         return true;
       },
       Hub::kHangsAfter);
-  if (!attached) return;  // again in the next cycle
+  if (!attached) return;  // the next cycle tries again
   reported_ = change;
   for (const std::string& text : in_words(change, "abbed started"))
     fmt::print(stderr, "abbed: {}\n", text);

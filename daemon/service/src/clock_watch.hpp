@@ -1,6 +1,6 @@
 #pragma once
-/// Reports and records each change of the wall clock once: the dates of the recording are those of
-/// the start. One thread, not the hub's.
+/// Reports and records each change of the wall clock once. This is necessary because the dates in
+/// the recording are computed with the clock at the start. One thread, not the hub's.
 
 #include <utility>
 

@@ -42,7 +42,7 @@ json request_json(std::uint64_t session, const std::shared_ptr<const std::string
   return out;
 }
 
-/// What the present or last session was asked for: the path, or the artefact.
+/// The request of the present or last session, with its path or artefact.
 Result<OnHub> calibration(const HubParts&, const json&) {
   return [](const Hub& hub) -> Reply {
     const CalibrationSession& session = hub.parts().calibration.session();
@@ -54,8 +54,8 @@ Result<OnHub> calibration(const HubParts&, const json&) {
 
 constexpr std::size_t kLongestName = 64, kLongestReason = 500;
 
-/// The remark of a client, at most `most` bytes and without control characters: it is shown on
-/// terminals, written to the journal and kept in the store.
+/// The remark of a client, at most `most` bytes and without control characters, because it is shown
+/// on terminals, written to the journal and kept in the store.
 std::string remark_of(std::string who, std::size_t most = kLongestName) {
   if (who.size() > most) {
     std::size_t end = most;  // moved to the start of a UTF-8 character
@@ -127,11 +127,13 @@ Result<OnHub> calibrate(const HubParts& parts, const json& request) {
   };
 }
 
-/// Long enough for a store whose lock is free, and short enough for a stop that waits behind it.
+/// Longest wait for the store. It is long enough for a store whose lock is free, and short enough
+/// for a stop request that waits behind it.
 constexpr std::chrono::milliseconds kStorePatience{50};
 
-/// {"id": of the active model} if the change is done; {"change": number} while it runs. `patience`:
-/// meanwhile no other client of the control socket gets an answer.
+/// The answer: {"id": id of the active model} if the change is done; {"change": number} while it
+/// runs. The call waits at most `patience`; during this time no other client of the control socket
+/// gets an answer.
 Result<OnHub> answer_change(StoreChanges& changes, const Result<std::uint64_t>& number,
                             std::chrono::milliseconds patience = kStorePatience) {
   ABBE_TRY(number);
@@ -174,7 +176,7 @@ Result<OnHub> change(const HubParts& parts, const json& request) {
   const auto changes = changes_of(parts);
   ABBE_TRY(changes);
   return answer_change(**changes, request.at("number").get<std::uint64_t>(),
-                       std::chrono::milliseconds{0});  // a client may ask again and again
+                       std::chrono::milliseconds{0});  // a client may ask repeatedly
 }
 
 Result<OnHub> cancel(const HubParts&, const json& request) {
@@ -352,7 +354,8 @@ constexpr std::array kVerbs{
     Verb{"touch", "cancel", Role::Look, cancel_touching},  // the role Look is enough for a stop
     Verb{"touch", "where", Role::Look, where_it_stands},
     Verb{"touch", "", Role::Move, begin_touching},
-    Verb{"touches", "", Role::Move, look_at_touches},  // continues a motion
+    // Move, because this request lets a motion continue
+    Verb{"touches", "", Role::Move, look_at_touches},
     Verb{"machine", "release", Role::Move, release_machine},
     Verb{"machine", "stop", Role::Look, stop_machine},
     Verb{"machine", "", Role::Look, machine_state},

@@ -45,7 +45,7 @@ struct CountingStateThread::Work {
   std::condition_variable wake = {};
   bool stopping = false;      // under mutex
   std::mutex outside = {};    // locked while look_at or report runs
-  bool left_running = false;  // under outside: the owner has ended
+  bool left_running = false;  // under outside: the owner of the thread was destroyed
   WakeUp ended = {};
   detail::RunningWork running = {};
 };

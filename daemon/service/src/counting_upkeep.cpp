@@ -27,8 +27,8 @@ void CountingUpkeep::hub_ended() noexcept {
   hub_has_ended_.store(true, std::memory_order_release);  // pairs with the acquire in look()
 }
 
-/// Counter state for a later run; nullopt if the card has no serial number that identifies it. The
-/// thread of the file.
+/// The state of the counters for a later run. nullopt if the card has no serial number that
+/// identifies it. Called on the thread that writes the file.
 std::optional<CountingState> CountingUpkeep::look(const std::string& set_up, Hub& hub) {
   if (boot_.empty()) return std::nullopt;
   const auto counted = [&hub] {

@@ -16,23 +16,24 @@ namespace abbe::daemon {
 
 class CountingUpkeep {
  public:
-  /// Reads the file. A file that cannot be used is added to `warnings`.
+  /// Reads the file. If it cannot be used, adds a warning to `warnings`.
   void read(const Config& config, std::vector<std::string>& warnings);
-  /// The state of the previous run, if it can still be valid. Not after start().
+  /// The state of the previous run, if it can still be valid. Do not call it after start().
   [[nodiscard]] const std::optional<CountingState>& left() const noexcept { return left_.state; }
 
   /// Starts the thread. `hub` must exist until end().
   void start(const Config& config, Hub& hub);
-  /// The hub's thread has ended: the service for reference marks is used without it.
+  /// Call it when the hub's thread has ended: the reference service is then read without the hub.
   void hub_ended() noexcept;
-  /// Writes the file a last time; waits for the disk, CountingStateThread::kEndTimeout at most.
+  /// Writes the file for the last time. Waits for the disk, at most
+  /// CountingStateThread::kEndTimeout.
   void end() { thread_.reset(); }
 
  private:
   [[nodiscard]] std::optional<CountingState> look(const std::string& set_up, Hub& hub);
 
   const std::string boot_ = boot_id();
-  LeftCounting left_;  // after start(): the thread's
+  LeftCounting left_;  // after start() it belongs to the thread
   std::atomic<bool> hub_has_ended_{false};
   std::optional<CountingStateThread> thread_;
 };

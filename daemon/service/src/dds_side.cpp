@@ -52,12 +52,13 @@ Result<DdsLinkPeer> DdsSide::peer(const DdsConfig& config) {
   return DdsLinkPeer{.user = account};
 }
 
-/// Warns only: acquisition and recording do not need abbe-dds, and abbe-dds itself refuses unusable
-/// keys.
+/// Adds warnings, but no errors: acquisition and recording do not need abbe-dds, and abbe-dds
+/// itself refuses unusable keys.
 void DdsSide::check_security(const DdsConfig& config, std::vector<std::string>& warnings) const {
   if (!dds_is_secured(config.security, config.profile)) {
     warnings.push_back(dds_security_is_off(config.domain));
-  } else if (!config.security.empty() && !network_user_) {  // else only abbe-dds can read it
+  } else if (!config.security.empty() && !network_user_) {  // otherwise only abbe-dds can read the
+                                                            // keys
     const auto keys =
         find_dds_identity(config.security, DdsRole::Daemon, std::chrono::system_clock::now());
     if (!keys)

@@ -1,6 +1,7 @@
 #pragma once
-/// What abbed has of DDS: the socket to which abbe-dds connects, what is published over it, and,
-/// where abbed starts abbe-dds itself, its supervisor. Nothing of it if [dds] supervise = "off".
+/// The part of abbed that belongs to DDS: the socket to which abbe-dds connects, the publisher and,
+/// if abbed starts abbe-dds itself, the supervisor. If [dds] supervise = "off", none of them
+/// exists.
 
 #include <sys/types.h>
 
@@ -23,19 +24,20 @@ class DdsSide {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
 
-  /// Opens the socket and starts abbe-dds. Io for what the system refuses; the rest is added to
-  /// `warnings`. `machine_id`: identity of the machine, empty: unknown. `utc`: of messages.
+  /// Opens the socket and starts abbe-dds. Io for errors of the system; other faults are added to
+  /// `warnings`. `machine_id`: identity of the machine, empty: unknown. `utc`: offset for messages.
   [[nodiscard]] Result<void> open(const Config& config, const AbbedOptions& options,
                                   const std::string& machine_id, protocol::UtcOffset utc,
                                   std::vector<std::string>& warnings);
-  /// Null: nothing is published. For the hub's thread.
+  /// The publisher; null: nothing is published. For the hub's thread.
   [[nodiscard]] Publisher* publisher() noexcept { return publisher_ ? &*publisher_ : nullptr; }
-  /// The user of abbe-dds, if it has a user of its own.
+  /// The user of abbe-dds, if it is not the user of abbed.
   [[nodiscard]] std::optional<uid_t> network_user() const noexcept { return network_user_; }
 
-  /// Restarts abbe-dds when it ended. Call it every cycle, from the thread that called open().
+  /// Restarts abbe-dds if it has ended. Call it every cycle, from the thread that called open().
   void cycle(WallTime now);
-  /// As the last cycle() left it; nullopt: abbe-dds is no child of abbed. Any thread.
+  /// State of abbe-dds after the last cycle(); nullopt: abbe-dds is not a child of abbed. Any
+  /// thread.
   [[nodiscard]] std::optional<ObservedParticipant> participant() const;
 
  private:

@@ -60,10 +60,11 @@ StreamHealth health_of(const ModelAuthority& authority, const CalibrationSession
   return h;
 }
 
-/// Adds to the health of each device what is wrong with its sensors.
+/// Adds the faults of its sensors to the health of each device.
 void add_findings(const std::vector<SensorFinding>& findings, std::vector<StreamHealth>& health) {
   for (const SensorFinding& finding : findings) {
-    // The first reading after a start waits for a second one that agrees; that is no fault.
+    // The first reading after a start is not used until a second one agrees with it; this is not a
+    // fault.
     if (finding.doubt == calib::SensorDoubt::Unconfirmed) continue;
     for (StreamHealth& stream : health) {
       if (stream.status.name != finding.device) continue;
@@ -73,8 +74,8 @@ void add_findings(const std::vector<SensorFinding>& findings, std::vector<Stream
   }
 }
 
-/// Counts readings that were not used as faults of their device. A single one is over when health
-/// is collected: then its text is the last fault.
+/// Counts readings that were not used as faults of their device. A doubt that lasts for a single
+/// reading is over when health is collected; its text is then shown as the last fault.
 void add_doubts(const std::vector<SensorDoubts>& doubts, std::vector<StreamHealth>& health) {
   for (const SensorDoubts& sensor : doubts) {
     for (StreamHealth& stream : health) {
@@ -110,7 +111,7 @@ StreamHealth health_of(const Publisher& publisher) {
   return h;
 }
 
-/// Whether DDS Security keeps unauthorised participants out of the domain.
+/// Health of DDS Security: whether unauthorised participants are excluded from the domain.
 StreamHealth health_of_security(const Publisher& publisher) {
   StreamHealth h;
   h.status.name = "dds_security";
@@ -126,7 +127,7 @@ struct Hub::Call {
   std::function<void()> task;
   std::exception_ptr thrown;
   std::atomic<bool> claimed{
-      false};  // by the hub, which runs the task, or by the caller after its time-out
+      false};  // set by the hub, which runs the task, or by the caller after its time-out
   WakeUp done;
 };
 
@@ -268,7 +269,7 @@ void Hub::run() {
     cycle(std::chrono::steady_clock::now());
     next += period;
     if (const auto now = std::chrono::steady_clock::now(); next < now)
-      next = now;  // the hub is late: missed cycles are skipped
+      next = now;  // the hub is late: the missed cycles are skipped
     sleep_until(next);
   }
 }
@@ -280,8 +281,8 @@ bool Hub::run_in_cycle(std::function<void()> task, std::chrono::milliseconds tim
   calls_.put(call.get());
 
   if (!call->done.wait_for(time_out)) {
-    // Whoever sets `claimed` first decides. The hub has not started the task: calls_ still holds
-    // the call, and the hub will move it to given_up_.
+    // The first one to set `claimed` decides. Here the hub has not started the task: calls_ still
+    // holds the call, and the hub will move it to given_up_.
     if (!call->claimed.exchange(true)) {
       (void)call.release();
       return false;
@@ -301,7 +302,8 @@ void Hub::run_calls() {
     }
     try {
       call->task();
-    } catch (...) {  // rethrown to the caller; e.g. a member of the wrong type
+    } catch (...) {  // rethrown on the caller's thread; for example, a member of the request has
+                     // the wrong type
       call->thrown = std::current_exception();
     }
     call->done.signal();  // the caller frees it now

@@ -14,7 +14,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// A refusal is a warning in mode `ignore`.
+/// Sets the priority. If the system refuses it, this is a warning in mode `ignore`.
 Result<void> set_priority(std::thread& thread, const DaemonConfig& config) {
   sched_param parameters{};
   parameters.sched_priority = config.hub_priority;
@@ -42,7 +42,7 @@ void run_hub(std::future<Hub*>& awaited) noexcept {
   try {
     hub->run();
   } catch (const std::exception& error) {  // Abbed::alive() then returns false
-    // without the hub nothing notices that the operator of the machine is gone
+    // without the hub nothing supervises the machine if its operator is gone
     (void)hub->parts().devices.stop_machine();
     fmt::print(stderr, "abbed: the hub ended with an internal error: {}\n", error.what());
   }

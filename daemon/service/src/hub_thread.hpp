@@ -1,5 +1,6 @@
 #pragma once
-/// The hub's thread: soft real time, above the ordinary programs and below the devices.
+/// The hub's thread: soft real time, with a priority above ordinary programs and below the device
+/// threads.
 
 #include <future>
 #include <thread>
@@ -17,7 +18,7 @@ class HubThread {
   ~HubThread() { end(); }
 
   /// Starts the thread, which waits for run(). Io if the system refuses its priority or its
-  /// processor; the thread then runs without what was refused.
+  /// processor; the thread then runs without this setting.
   [[nodiscard]] Result<void> start(const DaemonConfig& config);
   /// Runs the hub on the thread. `hub` must exist until end().
   void run(Hub& hub) { hub_.set_value(&hub); }
@@ -25,7 +26,7 @@ class HubThread {
   void end();
 
  private:
-  std::promise<Hub*> hub_;  // broken if the start of abbed failed
+  std::promise<Hub*> hub_;  // the promise is broken if the start of abbed failed
   std::thread thread_;
 };
 

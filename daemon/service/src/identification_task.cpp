@@ -21,8 +21,8 @@ namespace {
 
 constexpr std::chrono::milliseconds kLookForStop{100};
 
-// Longest wait for the hash of the recording; longer than a slow disk needs. After this time the
-// model is stored without this hash.
+// Longest wait for the hash of the recording; more than a slow disk needs. After this time the
+// model is stored without the hash.
 constexpr auto kDigestTimeout = std::chrono::seconds{10};
 
 /// Hash of the recording of the run. Never fails: if there is no hash, RecordingDigest::gap states
@@ -55,15 +55,15 @@ std::vector<calib::Backlash> determined_backlash(const calib::VolumetricModel& m
   return all;
 }
 
-/// The verdict is in the model: who gets its file knows it.
+/// Stores the verdict in the model, so that the receiver of its file knows it.
 void keep_verdict(ModelDocument& document, const calib::Verdict& verdict) {
   document.verdict = model_verdict(verdict);
 }
 
-/// The document of an update: that of the run with the updated model. Its parents, the run and the
-/// previous model, are the last inputs, with the hashes of their content. Statistics and residuals
-/// stay those of the run, and RunFigures::of_model names its model; the backlash is that of the
-/// update.
+/// The document of an update: the document of the run, with the updated model. Its parents, the run
+/// and the previous model, are the last inputs, with the hashes of their content. Statistics and
+/// residuals stay those of the run, and RunFigures::of_model names its model; the backlash is that
+/// of the update.
 ModelDocument updated_document(calib::ModelWithOffset model, const ModelDocument& run,
                                const PublishedModel& previous) {
   ModelDocument document = run;
@@ -75,7 +75,7 @@ ModelDocument updated_document(calib::ModelWithOffset model, const ModelDocument
   document.backlash = determined_backlash(document.model);
   if (document.run) {
     document.run->of_model = model_id(run);
-    document.run->held_out_cells.clear();  // predictions of the model of the run
+    document.run->held_out_cells.clear();  // they are predictions of the model of the run
   }
   return document;
 }
@@ -119,8 +119,8 @@ void IdentificationTask::add_notes(JudgedModel& model) const {
     notes.push_back(std::move(change));
 }
 
-/// Adds drift of the active model to the verdict. With [drift] continuous, an update of the active
-/// model takes the place of the model of the run, which is stored beside it.
+/// Adds drift of the active model to the verdict. With [drift] continuous, the document becomes an
+/// update of the active model; the model of the run is stored in addition to it.
 void IdentificationTask::compare_with_active(JudgedModel& model, const CalibrationRun& run) const {
   const DriftConfig& drift = config->drift;
   const DriftFinding finding =

@@ -1,6 +1,7 @@
 #pragma once
-/// The background task of a complete run: identifies the model, judges it, stores it, activates it
-/// if the gate accepted it, and encodes what is published of it. Its result reaches the hub once.
+/// The background task of a complete run. It identifies the model, judges it, stores it, activates
+/// it if the gate accepted it, and encodes the messages for publication. Its result is passed to
+/// the hub once.
 
 #include <atomic>
 #include <cstdint>
@@ -17,19 +18,20 @@
 
 namespace abbe::daemon {
 
-/// An identified model with its verdict. Not changed while it is stored, except `discarded`.
+/// An identified model with its verdict. While it is stored, only `discarded` may change.
 struct JudgedModel {
   std::string id;
   ModelDocument document;
   calib::Verdict verdict;
   StoreActor actor;
-  KeptBeside beside{};  ///< drift of the active model; the run alone, if `document` is an update
+  /// drift of the active model; and, if `document` is an update, the model of the run alone
+  KeptBeside beside{};
   std::atomic<bool> discarded{false};  ///< the session was cancelled: do not store the model
 };
 
-/// Shared by the hub's thread and the task of an identification, which may outlive the
-/// CalibrationService. The state of the calibration is in CalibrationSession, to which the hub's
-/// thread reports what the task has reached.
+/// Data shared by the hub's thread and the task of an identification, which may outlive the
+/// CalibrationService. The hub's thread reports the progress of the task to CalibrationSession,
+/// which holds the state of the calibration.
 class IdentificationLink {
  public:
   std::atomic<double> share{0.0};  ///< progress of the identification, 0 to 1
@@ -44,11 +46,11 @@ class IdentificationLink {
     // release: pairs with the acquire in take_model()
     if (first_.compare_exchange_strong(first, First::Storing, std::memory_order_release))
       return true;
-    model_ = nullptr;  // here, because the hub's thread must not free a model
+    model_ = nullptr;  // freed here, because the hub's thread must not free a model
     return false;
   }
-  /// For the hub: the model will not be stored when its identification ends. False if it is already
-  /// being stored.
+  /// For the hub: discards the model, so that it is not stored when its identification ends. False
+  /// if it is already being stored.
   [[nodiscard]] bool discard() noexcept {
     auto first = First::Neither;
     return first_.compare_exchange_strong(first, First::Discarded) || first == First::Discarded;
@@ -61,21 +63,22 @@ class IdentificationLink {
   }
 
  private:
-  /// Which of begin_storing() and discard() came first; decided once.
+  /// The function that was called first, begin_storing() or discard(). It is decided once.
   enum class First : std::uint8_t { Neither, Storing, Discarded };
   std::atomic<First> first_{First::Neither};
-  // owned by the task before begin_storing(), then by the hub
+  // belongs to the task before begin_storing(), then to the hub
   std::shared_ptr<JudgedModel> model_;
 };
 
-/// Run it once, on an ordinary thread.
+/// Call operator() once, on an ordinary thread.
 struct IdentificationTask {
   std::shared_ptr<IdentificationLink> link;
   std::shared_ptr<const Config> config;
   Acquisition acquired;
-  std::shared_ptr<const PublishedModel> active;  ///< the gate compares with it; may be null
+  /// the model with which the gate compares; may be null
+  std::shared_ptr<const PublishedModel> active;
   bool active_left_out = false;         ///< the active model is for another machine configuration
-  std::future<RecordingDigest> digest;  ///< invalid: nothing is recorded
+  std::future<RecordingDigest> digest;  ///< invalid: the run is not recorded
   ModelKeeper keeper;
   WallClock clock;
   std::string who;

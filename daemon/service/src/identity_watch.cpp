@@ -13,8 +13,8 @@ namespace {
 
 using Known = IdentityWatch::Known;
 
-/// Where the store cannot be read, the models of the other machine are those that were known
-/// `before`. At the start none are: then no model can be used.
+/// If the store cannot be read, the models of the other machine are those in `before`. At the start
+/// `before` is empty, and no model can be used then.
 Known known_from(const MachineIdentity& identity, const ComputerMarks& here,
                  const std::filesystem::path& data_dir, const Known& before) {
   Known known{
@@ -29,8 +29,9 @@ Known known_from(const MachineIdentity& identity, const ComputerMarks& here,
   return known;
 }
 
-/// A damaged file may hide that a person has not decided yet. A file that could not be written at
-/// the first start hides nothing.
+/// The result for an identity that cannot be read. A damaged file may hide that a person still has
+/// to decide, so no model may be ACTIVE. If the file could not be written at the first start, there
+/// is no such doubt.
 Known unknown(const Error& error) {
   return {.machine_id = {},
           .doubt = error.code == ErrorCode::BadInput ? error.text : std::string{},
@@ -59,8 +60,8 @@ void IdentityWatch::follow(WallTime now) {
     if (!ready(reading_)) return;
     try {
       auto read = reading_.get();
-      // What is known stays while the disk does not answer: the identity that is published, and why
-      // no model, or not that of the other machine, may be ACTIVE.
+      // While the disk does not answer, the known values stay valid: the identity that is
+      // published, and the reasons why no model, or no model of the other machine, may be ACTIVE.
       if (read.machine_id.empty() && read.doubt.empty())
         known_.fault = std::move(read.fault);
       else

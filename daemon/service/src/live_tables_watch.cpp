@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// Run once, on an ordinary thread.
+/// Call operator() once, on an ordinary thread.
 struct LiveTablesWatch::Task {
   std::shared_ptr<const Config> config;
   std::unique_ptr<OtfLiveTables> state;  ///< null: the first task of a session
@@ -18,7 +18,7 @@ struct LiveTablesWatch::Task {
   [[nodiscard]] Solved operator()() {
     if (!state) {
       auto made = OtfLiveTables::of(*config);
-      if (!made) return {};  // the identification reports it
+      if (!made) return {};  // the identification reports this error
       state = std::make_unique<OtfLiveTables>(std::move(*made));
     }
     state->take(std::move(news));
@@ -57,7 +57,7 @@ void LiveTablesWatch::take_result() {
   Solved result;
   try {
     result = task_.get();
-  } catch (const std::exception&) {  // the accumulation is lost, not the run
+  } catch (const std::exception&) {  // the accumulation for the tables is lost, but not the run
   }
 
   if (task_session_ != session_) {

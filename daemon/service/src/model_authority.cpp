@@ -17,7 +17,8 @@ using protocol::HostTime;
 // or restore it from a backup, which does not change the stamp of the store.
 constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
-/// Why the gate refused the active model; empty: it accepted it, or its reasons are not known.
+/// The reasons why the gate refused the active model; empty: it accepted the model, or the reasons
+/// are not known.
 std::string refusal_of(const StoreEvent& activation) {
   return fmt::format("{}", fmt::join(activation.reasons, "; "));
 }

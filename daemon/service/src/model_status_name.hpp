@@ -6,7 +6,7 @@
 
 namespace abbe::daemon {
 
-/// As people and programs read it.
+/// The name of the status for people and programs.
 inline std::string_view status_name(v1::ModelStatus status) {
   switch (status) {
     case v1::ModelStatus::MODEL_NONE:

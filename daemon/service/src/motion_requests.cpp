@@ -26,8 +26,8 @@ OnHub with_touching(std::function<Reply(TouchService&)> task) {
   };
 }
 
-/// The outcome of a touch job, copied on the hub's thread. Of each touch it has only the fields
-/// that the answer contains.
+/// The outcome of a touch job, copied on the hub's thread. Each touch has only the fields that the
+/// answer contains.
 struct SeenTouches {
   struct Made {
     std::array<double, 3> at_m{};
@@ -118,7 +118,7 @@ Result<OnHub> release_machine(const HubParts&, const json&) {
 }
 
 Result<OnHub> stop_machine(const HubParts& parts, const json&) {
-  // On the client's thread: a hub that hangs does not delay AbortE.
+  // This runs on the client's thread, so that a hub that hangs does not delay AbortE.
   const auto number = parts.devices.stop_machine();
   ABBE_TRY(number);
   return [number = *number](const Hub& hub) {

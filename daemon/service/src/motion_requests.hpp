@@ -7,22 +7,25 @@
 
 namespace abbe::daemon {
 
-/// {"do": "touch", "points": [...], "leave": [...]}. A plan that is too long is an Error Usage.
+/// The request {"do": "touch", "points": [...], "leave": [...]}. A plan that is too long is an
+/// Error Usage.
 [[nodiscard]] Result<OnHub> begin_touching(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "touch", "cancel": true}
+/// The request {"do": "touch", "cancel": true}.
 [[nodiscard]] Result<OnHub> cancel_touching(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "touch", "where": true}
+/// The request {"do": "touch", "where": true}.
 [[nodiscard]] Result<OnHub> where_it_stands(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "touches"}
+/// The request {"do": "touches"}.
 [[nodiscard]] Result<OnHub> look_at_touches(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "machine", "release": true}: only for a person who has looked at the machine.
+/// The request {"do": "machine", "release": true}. Only a person who has inspected the machine may
+/// send it.
 [[nodiscard]] Result<OnHub> release_machine(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "machine", "stop": true}: stops every motion, and answers with the number of the stop.
+/// The request {"do": "machine", "stop": true}: stops every motion. The answer contains the number
+/// of the stop.
 [[nodiscard]] Result<OnHub> stop_machine(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "machine"}
+/// The request {"do": "machine"}.
 [[nodiscard]] Result<OnHub> machine_state(const HubParts& parts, const nlohmann::json& request);
 
-/// Adds "stop" with number, outcome and text, if there was a request to stop.
+/// Adds the member "stop" with number, outcome and text, if a stop was requested.
 void add_stop(nlohmann::json& answer, const drivers::IppStop& stop);
 
 }  // namespace abbe::daemon

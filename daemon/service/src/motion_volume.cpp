@@ -14,7 +14,8 @@ namespace abbe::daemon {
 namespace {
 
 constexpr double kMmPerM = 1e3;
-/// Above the rounding of a normal with nine decimals, far below a direction that is wrong.
+/// Tolerance for the length of a normal. It is larger than the rounding of a normal with nine
+/// decimals, and much smaller than the error of a wrong direction.
 constexpr double kUnitTolerance = 1e-6;
 constexpr std::array<char, 3> kAxes{'X', 'Y', 'Z'};
 
@@ -43,7 +44,8 @@ class PlaceFaults {
  public:
   explicit PlaceFaults(const MotionVolume& volume) : volume_(volume) {}
 
-  /// `name` makes the name of the place; it is called for the first fault only.
+  /// Counts a fault of the place. `name` makes the name of the place; it is called for the first
+  /// fault only.
   template <class Name>
   void look(const drivers::ProbePoint& place, const Name& name) {
     auto fault = place_fault(volume_, place.position_m);
@@ -69,7 +71,7 @@ class PlaceFaults {
 MotionVolume motion_volume(const Config& config) {
   MotionVolume volume;
   const auto source = motion_source(config);
-  const auto& axes = config.machine.axes;  // X, Y, Z first
+  const auto& axes = config.machine.axes;  // X, Y, Z are the first axes
   for (std::size_t i = 0; i < kLinearAxes && i < axes.size(); ++i) {
     volume.min_m[i] = axes[i].min;
     volume.max_m[i] = axes[i].max;

@@ -8,7 +8,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// nullopt until the outcome of the latest request to stop the machine is known.
+/// The latest request to stop the machine; nullopt until its outcome is known.
 std::optional<ObservedStop> observed_stop(const drivers::IppStop& stop) {
   using enum drivers::IppStopOutcome;
   if (stop.outcome == None || stop.outcome == Pending) return std::nullopt;

@@ -12,9 +12,9 @@
 
 namespace abbe::daemon {
 
-/// Writes the answer; any thread.
+/// Writes the answer. May be called on any thread.
 using Reply = std::function<nlohmann::json()>;
-/// The hub's thread.
+/// The step that runs on the hub's thread.
 using OnHub = std::function<Reply(const Hub&)>;
 
 inline Reply reply(nlohmann::json answer) {

@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// True when outcome_of() need not wait. False if `work` is not valid.
+/// True if outcome_of() would not have to wait. False if `work` is not valid.
 template <class T>
 [[nodiscard]] bool ready(const std::future<T>& work) {
   return work.valid() && work.wait_for(std::chrono::seconds{0}) == std::future_status::ready;

@@ -24,11 +24,12 @@ constexpr std::array kIgnored{SIGPIPE, SIGUSR1, SIGUSR2,   SIGALRM, SIGVTALRM, S
                               SIGIO,   SIGXFSZ, SIGSTKFLT, SIGTSTP, SIGTTIN,   SIGTTOU};
 constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGSYS, SIGTRAP, SIGABRT};
 
-// What the handlers replaced: the default action, or the report of a sanitizer.
+// The actions that were replaced by the handlers: the default action, or the report of a sanitizer.
 std::array<struct sigaction, NSIG> replaced_actions{};
 std::atomic_flag crash_is_handled = ATOMIC_FLAG_INIT;
 
-/// Literals, because a signal handler may not allocate.
+/// The result of the stops as text. The texts are literals, because a signal handler may not
+/// allocate.
 std::string_view text_of(const drivers::EmergencyStops& stops) noexcept {
   if (stops.not_sent > 0)
     return "abbed: AbortE cannot be sent: there is no connection to the measuring machine; it may "
@@ -44,11 +45,13 @@ void write_now(std::string_view text) noexcept {
   write_within(STDERR_FILENO, text, kCrashMessageTime);
 }
 
-/// Async-signal-safe. The signal is blocked while its handler runs; after it, the replaced action
-/// applies: a fault happens again, and raise() has left a pending signal.
+/// The handler for crashes. Async-signal-safe. The signal is blocked while the handler runs. After
+/// the handler the replaced action applies, because the fault happens again, or because raise() has
+/// left a pending signal.
 void stop_machines_and_crash(int number) {
   if (crash_is_handled.test_and_set())
-    for (;;) ::pause();  // another thread crashes too: the first one ends the process
+    // another thread crashed as well: the thread that crashed first ends the process
+    for (;;) ::pause();
 
   const auto stops = drivers::send_emergency_stops(kAbortAnswer);
   write_now("abbed: internal error: ended by ");
@@ -59,7 +62,7 @@ void stop_machines_and_crash(int number) {
   ::raise(number);
 }
 
-/// Writes the exception, then SIGABRT follows.
+/// Writes the text of the exception; afterwards SIGABRT follows.
 [[noreturn]] void on_terminate() noexcept {
   try {
     if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);

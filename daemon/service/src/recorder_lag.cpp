@@ -5,8 +5,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// The largest of 1, 2, 5, 10, 20, 50 ... that is not above `value`; 0 below 1. A text with it does
-/// not change every second.
+/// The largest of 1, 2, 5, 10, 20, 50 ... that is not above `value`; 0 below 1. A text that
+/// contains it does not change every second.
 int round_down(double value) {
   int step = 1;
   for (const int factor : {2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000})
@@ -14,7 +14,7 @@ int round_down(double value) {
   return value >= 1.0 ? step : 0;
 }
 
-/// "5 s", "200 ms": rounded down.
+/// The time as text, rounded down: "5 s", "200 ms".
 std::string rounded_text(std::chrono::nanoseconds t) {
   const double t_s = std::chrono::duration<double>(t).count();
   return t_s >= 1.0 ? fmt::format("{} s", round_down(t_s))

@@ -1,6 +1,7 @@
 #pragma once
-/// Upkeep of the recordings in the background: closes, at the start, those that a killed abbed left
-/// open, and removes, every hour, those that [recording] does not keep. One thread, not the hub's.
+/// Upkeep of the recordings in the background. At the start it closes the recordings that a killed
+/// abbed left open. Every hour it removes recordings that [recording] does not keep. One thread,
+/// not the hub's.
 
 #include <atomic>
 #include <chrono>
@@ -17,24 +18,27 @@
 
 namespace abbe::daemon {
 
-/// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, unique for each daemon process.
+/// A new name for a recording, "abbe-2026-11-21T03-40-12Z-4711": readable, sorted by time, unique
+/// for each daemon process.
 [[nodiscard]] std::string recording_name();
 
 class RecordingUpkeep {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::hours kPeriod{1};
-  /// Time for a time server to correct the clock after boot.
+  /// First removal after the start. It leaves a time server the time to correct the clock after
+  /// boot.
   static constexpr std::chrono::minutes kFirst{10};
 
   /// `running`: name of the recording of this run. `config` must outlive this object.
   RecordingUpkeep(const Config& config, std::string running, WallClock clock);
 
-  /// This run began at `now`: begins to close the recordings that were left open.
+  /// States that this run began at `now`, and begins to close the recordings that were left open.
   void start(WallTime now);
-  /// Begins the work when it is due, and reports what the last one did to stderr. Never waits.
+  /// Begins the work when it is due, and reports the results of the previous work on stderr. Never
+  /// waits.
   void cycle(WallTime now);
-  /// Ends the work at the start early. Nothing waits for it.
+  /// Ends the work of the start early. Does not wait for its end.
   void stop() noexcept { *stopping_ = true; }
 
  private:
@@ -48,9 +52,9 @@ class RecordingUpkeep {
   ClockSteps clock_steps_;
   WallTime running_since_{};
   WallTime next_ = WallTime::clock::now() + kFirst;
-  bool removes_ = true;  // false after the clock was set
+  bool removes_ = true;  // false once the clock was set
   std::future<Result<std::vector<std::filesystem::path>>> removing_;
-  // Owned by the background task, which the end of abbed does not wait for.
+  // These members belong to the background task; the end of abbed does not wait for it.
   const std::shared_ptr<std::atomic<bool>> stopping_ = std::make_shared<std::atomic<bool>>(false);
   std::future<Result<std::vector<LeftRecording>>> closing_;
 };

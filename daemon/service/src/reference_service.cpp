@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kStandsFor = 500ms;
-// m or rad; the positions of a drive in position control scatter by less than this
+// in m or rad; the positions of an axis in position control scatter by less than this
 constexpr double kStill = 2e-6;
 constexpr double kStillCounts = 2.0;  // an axis at rest may change by this many counts
 
@@ -79,8 +79,8 @@ void ReferenceService::use_zeros_left(const protocol::AxisSample& first) {
   }
 }
 
-/// Takes a state of the counters. If it is later than the newest sample it waits, because a sample
-/// that shows a restart of the counters must be taken before a state after that restart.
+/// Takes a state of the counters. If it is later than the newest sample, it waits: a sample that
+/// shows a restart of the counters must be taken before a state after this restart.
 void ReferenceService::take(const std::optional<CountingProgress>& progress) {
   if (progress) coming_ = progress;
   if (!coming_ || coming_->head.time > newest_) return;
@@ -100,7 +100,7 @@ void ReferenceService::look_for_marks(const Batch& batch) {
   for (std::size_t i = 0; i < zero_used_.size(); ++i) {
     const bool found = session_->axis(i).state == AxisReference::State::Found;
     if (found && !zero_used_[i]) use_zero(i);
-    zero_used_[i] = found;  // false again after a restart of the card
+    zero_used_[i] = found;  // it becomes false after a restart of the card
   }
   if (session_->finished()) running_ = false;
 }

@@ -15,7 +15,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// The end of abbed waits for a hub that hangs no longer than this because of the sensors.
+/// Longest time for which the end of abbed waits for a hanging hub to save the state of the
+/// sensors.
 constexpr std::chrono::milliseconds kSensorsTimeout{100};
 
 }  // namespace

@@ -1,7 +1,6 @@
 #pragma once
-/// Keeps the state of the checks of the sensors over a restart of abbed: reads
-/// DATA_DIR/sensor-state.json at the start, and writes it every 5 s in the background. One thread,
-/// not the hub's.
+/// Keeps the state of the sensor checks over a restart of abbed: reads DATA_DIR/sensor-state.json
+/// at the start, and writes it every 5 s in the background. One thread, not the hub's.
 
 #include <chrono>
 #include <future>
@@ -24,10 +23,11 @@ class SensorUpkeep {
   SensorUpkeep(const Config& config, const drivers::TimeSource& time)
       : config_(config), time_(time) {}
 
-  /// The state of the sensors in the earlier run; nullopt: they start without one. A file that
-  /// cannot be used is added to `warnings`.
+  /// The state of the sensors in the earlier run; nullopt: the sensors start without a state. If
+  /// the file cannot be used, adds a warning to `warnings`.
   [[nodiscard]] std::optional<RecordingAttachment> left(std::vector<std::string>& warnings) const;
-  /// Writes the file when it is due. Does not wait for the disk, and 100 ms at most for the hub.
+  /// Writes the file when it is due. Does not wait for the disk; waits for the hub for at most 100
+  /// ms.
   void cycle(WallTime now, Hub& hub);
 
  private:
@@ -37,7 +37,7 @@ class SensorUpkeep {
   const Config& config_;
   const drivers::TimeSource& time_;
   std::future<Result<void>> writing_;
-  std::string fault_;  ///< as reported
+  std::string fault_;  ///< fault that was reported last
   WallTime next_ = WallTime::clock::now() + kWritten;
 };
 

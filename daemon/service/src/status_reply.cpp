@@ -25,8 +25,8 @@ namespace {
 
 using nlohmann::json;
 
-/// The buckets that are not empty: [exclusive upper bound in s, count]. A client that asks twice
-/// has the histogram of the time in between.
+/// The buckets that are not empty: [exclusive upper bound in s, count]. A client that reads them
+/// twice gets the histogram of the time in between as the difference.
 json latency_json(const drivers::LatencyHistogram::Counts& counts) {
   json buckets = json::array();
   for (std::size_t i = 0; i < counts.of_bucket.size(); ++i) {
@@ -85,12 +85,12 @@ json next_json(const RequestedTouch& next) {
   return out;
 }
 
-/// JSON has no NaN: null in its place.
+/// The value; null for NaN, which JSON does not have.
 json number_or_null(double value) {
   return std::isnan(value) ? json{} : json(value);
 }
 
-/// Rounded to 0.1 nm or 0.1 nrad, so that the reply stays short.
+/// The values, rounded to 0.1 nm or 0.1 nrad, so that the reply stays short.
 json rounded(const std::vector<double>& values) {
   constexpr double kPerUnit = 1e10;
   json out = json::array();
@@ -121,7 +121,7 @@ json start_json(const StartState& start) {
   return {{"ready", start.ready}, {"missed", start.missed}, {"conditions", std::move(conditions)}};
 }
 
-/// `speed`: of the time of simulated devices; 1 with real ones.
+/// `speed`: host time per real time of simulated devices; 1 for real devices.
 json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out,
                   double speed) {
   json out{{"id", s.id},
@@ -242,8 +242,8 @@ json reference_json(const SeenReference& reference, const MachineConfig& machine
   return {{"running", reference.running}, {"axes", std::move(axes)}};
 }
 
-/// The positions; null for one that is not current, because a client could take an old position for
-/// the current one.
+/// The positions. A position that is not current is null, so that a client cannot use it as the
+/// current one.
 json positions_json(const protocol::Snapshot& live, bool old) {
   json positions = json::array();
   for (std::size_t axis = 0; axis < live.axis_count; ++axis) {
@@ -286,7 +286,7 @@ struct SeenLink {
   bool connected;
   DdsLinkCounters counters;
   std::string security;
-  const DdsProcess* process;  ///< for any thread
+  const DdsProcess* process;  ///< may be read by any thread
 };
 
 json dds_json(const SeenLink& link) {
@@ -315,7 +315,7 @@ json identity_json(const IdentityWatch::Known& identity, const std::string& twin
   return out;
 }
 
-/// What `status` reports, copied on the hub's thread.
+/// The data of the answer to `status`, copied on the hub's thread.
 struct SeenStatus {
   std::vector<StreamHealth> streams;
   SeenModel model;
@@ -374,7 +374,7 @@ SeenStatus look_at_status(const Hub& hub) {
   return seen;
 }
 
-/// Why each axis has no position; empty: it has one.
+/// The reason why each axis has no position; empty: it has one.
 std::vector<std::string> missing_reasons(const SeenStatus& seen) {
   std::vector<std::string> reasons(seen.live.axis_count);
   for (std::size_t axis = 0; axis < reasons.size(); ++axis) {

@@ -5,10 +5,10 @@
 
 namespace abbe::daemon {
 
-/// Copies what the answer to "status" needs; to be called on the hub's thread. Positions older than
+/// Copies the data for the answer to "status". Call it on the hub's thread. Positions older than
 /// half a second of wall time, and those of missing axes, are null in the answer.
 [[nodiscard]] Reply status_reply(const Hub& hub);
-/// The positions alone, for displays that ask often.
+/// The answer with the positions alone, for displays that ask often.
 [[nodiscard]] Reply live_reply(const Hub& hub);
 
 }  // namespace abbe::daemon

@@ -10,7 +10,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// For the lock of the store, after which the outcome names its holder.
+/// Longest wait for the lock of the store. If it is exceeded, the outcome names the holder of the
+/// lock.
 constexpr std::chrono::seconds kLockPatience{5};
 
 StoreActor store_actor(std::string who, std::string why) {

@@ -17,7 +17,8 @@ using namespace std::chrono_literals;
 
 constexpr auto kPeriod = 1h;
 
-/// The removed models. The list brings the index up to date.
+/// Removes the models that are not kept and returns their ids. Listing the models updates the
+/// index.
 Result<std::vector<std::string>> keep_up(const std::filesystem::path& folder,
                                          const ModelRetention& retention) {
   ModelStore store{folder};

@@ -1,7 +1,7 @@
 #pragma once
-/// Upkeep of the model store in the background: brings its index up to date, so that readers that
-/// may not write to the store need not read every model, and removes the models that [models] does
-/// not keep. At the start, then every hour.
+/// Upkeep of the model store in the background, at the start and then every hour. It updates the
+/// index of the store, so that readers that may not write to the store need not read every model.
+/// It also removes the models that [models] does not keep.
 
 #include <chrono>
 #include <filesystem>
@@ -21,14 +21,15 @@ class StoreUpkeep {
   StoreUpkeep(std::filesystem::path store, ModelRetention retention)
       : store_(std::move(store)), retention_(retention) {}
 
-  /// Begins the work when it is due, and reports what the last one removed to stderr. Never waits.
+  /// Begins the work when it is due, and reports the models that the previous work removed on
+  /// stderr. Never waits.
   void cycle(WallTime now);
 
  private:
   std::filesystem::path store_;
   ModelRetention retention_;
   std::future<Result<std::vector<std::string>>> work_;
-  WallTime next_{};  ///< at once
+  WallTime next_{};  ///< the first work is due at once
 };
 
 }  // namespace abbe::daemon

@@ -122,7 +122,7 @@ void TouchService::ask_next() {
 }
 
 /// After the last touch, retracts along `leave_`, which begins at the last point of the job. If the
-/// job ended earlier, the machine stands elsewhere and does not retract, because no free path is
+/// job ended earlier, the machine does not retract, because from its position no free path is
 /// known.
 void TouchService::leave() {
   leaving_ = status_.reason.empty() && !leave_.empty();

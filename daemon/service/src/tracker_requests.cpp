@@ -17,7 +17,7 @@ using drivers::TrackerOrder;
 using drivers::TrackerOrderReport;
 using nlohmann::json;
 
-/// All orders except the list of reflectors, which moves nothing and has a request of its own.
+/// All orders except the list of reflectors, which has a separate request because it moves nothing.
 constexpr std::array kMovingOrders{TrackerOrder::What::Initialize, TrackerOrder::What::GoHome,
                                    TrackerOrder::What::FindReflector,
                                    TrackerOrder::What::SetReflector};
@@ -79,7 +79,8 @@ Result<TrackerOrder> tracker_order_from_json(const json& request) {
     order.reflector = request.at("reflector").get<std::string>();
 
   if (order.what == TrackerOrder::What::FindReflector) {
-    const json distance = request.value("distance_m", json{});  // JSON has no NaN
+    // the distance is missing or not a number; JSON has no NaN
+    const json distance = request.value("distance_m", json{});
     order.distance_m =
         distance.is_number() ? distance.get<double>() : std::numeric_limits<double>::quiet_NaN();
   }

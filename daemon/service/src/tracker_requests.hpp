@@ -11,7 +11,7 @@
 
 namespace abbe::daemon {
 
-/// Copied on the hub's thread.
+/// State of the tracker, copied on the hub's thread.
 struct SeenTracker {
   drivers::DeviceStatus status;
   std::deque<TrackerService::Order> orders;

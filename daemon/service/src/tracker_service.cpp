@@ -15,7 +15,7 @@ namespace {
 using drivers::TrackerOrder;
 using drivers::TrackerOrderReport;
 
-/// Why the order is invalid; empty if it is valid.
+/// The fault of the order; empty if it is valid.
 std::string order_fault(const TrackerOrder& order) {
   const bool reachable = order.distance_m > 0.0 && order.distance_m <= drivers::kLongestSearch_m;
   if (order.what == TrackerOrder::What::FindReflector && !reachable)

@@ -8,7 +8,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// abbe-dds as a unit has a user of its own, which cannot enter the folder of the control socket.
+/// The default socket. If systemd runs abbe-dds, its user cannot enter the folder of the control
+/// socket, so another folder is used.
 std::filesystem::path default_socket(std::filesystem::path folder, Supervise supervise) {
   if (supervise == Supervise::Systemd) folder += "-dds";
   return folder / "dds.sock";

@@ -3,14 +3,15 @@
 //
 //   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]] [--machine NAME MACHINE_ID]
 //
-// It prints for every Compensation of every machine whether it may be applied, and when one that
-// may be applied may no longer be, because nothing newer has arrived. KEYS is the folder
+// For every Compensation of every machine it prints whether it may be applied. It also prints when
+// a vector that could be applied may no longer be applied, because no newer one has arrived. KEYS
+// is the folder
 // of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
 // identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
 // name is used, and no other one while the program runs. PROFILES.xml has a participant profile
 // "abbe"; without it UDP on all interfaces is used. Fast DDS calls the listener from its own
-// threads. As a last defence against strangers limit the memory of the process, for example with
-// MemoryMax= of its systemd unit.
+// threads. As a last defence against foreign participants, limit the memory of the process, for
+// example with MemoryMax= of its systemd unit.
 //
 // Exit codes: 2 a wrong argument, 3 an unusable PROFILES.xml, 4 Fast DDS refuses.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -105,7 +106,7 @@ struct Publisher {
 /// The last vector of a machine, while it may be applied.
 struct Applied {
   Compensation vector;
-  std::int64_t age_ns;  ///< when it arrived
+  std::int64_t age_ns;  ///< age of the vector when it arrived
   SteadyClock::time_point arrived;
 };
 
@@ -118,9 +119,9 @@ struct Machine {
   std::optional<Applied> applied;
 };
 
-/// The rule of abbe_v1.idl: nullptr if the vector may be applied, else the reason. `alive`: the
-/// writer of the state is alive (DDS liveliness). `age_ns`: age of the vector including the delay
-/// after its publication.
+/// The rule of abbe_v1.idl: nullptr if the vector may be applied, else the reason why not. `alive`:
+/// the writer of the state is alive (DDS liveliness). `age_ns`: age of the vector including the
+/// delay after its publication.
 const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher& publisher,
                     bool alive) {
   const ModelState& state = publisher.state;
@@ -155,7 +156,7 @@ class Listener : public DataReaderListener {
   }
 
  private:
-  /// nullptr: the last vector may still be applied.
+  /// The reason why the last vector may no longer be applied; nullptr: it may still be applied.
   const char* why_not_any_more(Machine& machine) const {
     const auto pinned = machine.pin.pinned();
     if (!pinned) return "the publisher states another machine";
@@ -171,7 +172,8 @@ class Listener : public DataReaderListener {
   void on_liveliness_changed(DataReader*, const LivelinessChangedStatus& status) override {
     const std::lock_guard lock(mutex_);
     const Writer writer = status.last_publication_handle;
-    if (alive_.size() > 4096) alive_.clear();  // each is in again with its next state, in a second
+    // each writer is added again with its next state, within a second
+    if (alive_.size() > 4096) alive_.clear();
     if (status.alive_count_change > 0) alive_.insert(writer);
     if (status.alive_count_change >= 0) return;
     alive_.erase(writer);
@@ -249,7 +251,8 @@ class Listener : public DataReaderListener {
     return {found->second, machine.pin.pinned() == id};
   }
 
-  /// The given machines; if none is, no more than 256: any participant may make up names.
+  /// True if the machine is stored: one of the given machines; or, if none was given, one of the
+  /// first 256, because any participant may publish any number of names.
   [[nodiscard]] bool has_place(const std::string& name) const {
     if (!machine_ids_.empty()) return machine_ids_.contains(name);
     return machines_.size() < 256 || machines_.contains(name);
@@ -273,7 +276,7 @@ class Listener : public DataReaderListener {
     std::printf("%s: %s %s is ignored\n", name.c_str(), what, text_of(id).c_str());
   }
 
-  /// A sample that tells which machine a publisher is.
+  /// Evaluates an Identity, which states the machine of a publisher.
   void identify(const Identity& identity, const Writer& writer) {
     const std::string name = identity.machine().to_string();
     if (has_place(name)) heard(name, writer, &identity);
@@ -344,12 +347,14 @@ void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
-/// Readers divide what they receive into so many instances.
+/// Number of instances into which readers divide the received samples.
 constexpr int kInstances = 1024;
-/// Most participants, and writers of a topic, that are kept, and most endpoints of each on average.
+/// Most participants and most writers of a topic that are kept, and most endpoints of each
+/// participant on average.
 constexpr std::size_t kMostParticipants = 512, kMostEndpointsEach = 16;
 
-/// Without limits a stranger that announces ever new participants and writers takes all memory.
+/// Sets limits for the memory. Without them, another participant that announces participants and
+/// writers without end would exhaust the memory.
 void limit_memory(DomainParticipantQos& qos) {
   qos.allocation().participants.maximum = kMostParticipants;
   qos.allocation().readers.maximum = qos.allocation().writers.maximum = kMostEndpointsEach;
@@ -365,7 +370,7 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
         std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
   }
   using abbe::dds::
-      Protection;  // the governance that `abbe dds keys` makes has every message signed
+      Protection;  // the governance of `abbe dds keys` requires that every message is signed
   const auto protection = secured ? Protection::Messages : Protection::None;
   const auto window = secured ? nullptr : std::make_shared<abbe::dds::SequenceWindow>();
   for (auto& transport : transports.user_transports)
@@ -376,9 +381,9 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
 /// bytes that are no valid message, and an exception in a thread of Fast DDS ends the process. Such
 /// a sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
 /// the next sample.)
-/// It has no more than kInstances keys, by a hash of the generated one: strangers may make up any
-/// number of keys, and Fast DDS 2.9 aborts where the table of instances is full. Of two machines
-/// with the same one the later sample replaces one that was not taken yet.
+/// The key is reduced to kInstances values by a hash of the generated key, because participants may
+/// publish any number of keys, and Fast DDS 2.9 aborts when its table of instances is full. If two
+/// machines have the same value, the later sample replaces an earlier one that was not taken yet.
 template <class GeneratedType>
 class Checked final : public GeneratedType {
   bool getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*/) override {
@@ -386,7 +391,7 @@ class Checked final : public GeneratedType {
     if (!GeneratedType::getKey(data, &key, true)) return false;
     const int index = (key.value[0] << 8 | key.value[1]) % kInstances;
     *handle = InstanceHandle_t();
-    handle->value[0] = 1;  // zeros alone mean "none"
+    handle->value[0] = 1;  // a handle of zeros means "none"
     handle->value[14] = static_cast<std::uint8_t>(index >> 8);
     handle->value[15] = static_cast<std::uint8_t>(index & 0xff);
     return true;
@@ -416,7 +421,7 @@ bool read_topic(DomainParticipant* participant, Subscriber* subscriber, TypeSupp
   return topic != nullptr && subscriber->create_datareader(topic, qos, listener) != nullptr;
 }
 
-/// A decimal number of a domain whose ports exist [DDSI-RTPS 2.5, 9.6.2].
+/// The domain in a decimal number; nullopt unless its ports exist [DDSI-RTPS 2.5, 9.6.2].
 std::optional<unsigned> domain_of(std::string_view text) {
   constexpr unsigned kHighest = 232;
   unsigned domain = 0;
@@ -459,8 +464,8 @@ int main(int argc, char** argv) {
                        ReturnCode_t::RETCODE_OK)) {
     return refuse(3, std::string("no participant profile \"abbe\" can be read from ") + argv[2]);
   }
-  // Fast DDS tries so many ports. With its default of 100 the participants beyond the first hundred
-  // of a computer receive nothing, and no error is reported.
+  // Number of ports that Fast DDS tries. With its default of 100, participants after the first
+  // hundred on a computer would receive nothing, and no error would be reported.
   participant_qos.wire_protocol().builtin.mutation_tries = 400;
   limit_memory(participant_qos);
   if (argc > 3) use_keys(argv[3], participant_qos);

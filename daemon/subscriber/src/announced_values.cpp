@@ -8,8 +8,8 @@
 namespace abbe::dds {
 namespace {
 
-/// Reads a value in CDR from the front to the end. Each function is false if what it reads does not
-/// fit into the rest of the value.
+/// Reads a value in CDR from the front to the end. Each function returns false if the item that it
+/// reads does not fit into the rest of the value.
 class Value {
  public:
   Value(std::span<const std::uint8_t> bytes, bool little_endian)
@@ -20,7 +20,7 @@ class Value {
     at_ += octets;
     return true;
   }
-  /// Ends with the octet 0, which counts.
+  /// A text. The octet 0 at its end is included in the length.
   bool text() {
     const auto length = count();
     return length && *length > 0 && skip(*length) && bytes_[at_ - 1] == 0 && align();
@@ -61,7 +61,7 @@ class Value {
     const std::size_t from = at_;
     return skip(4) ? std::optional{reader_.u32(from)} : std::nullopt;
   }
-  /// To a multiple of four. The end of a value that has no padding counts as one.
+  /// Skips to a multiple of four. The end of a value without padding also counts as aligned.
   bool align() { return skip((4 - at_ % 4) % 4) || at_ == bytes_.size(); }
 
   std::span<const std::uint8_t> bytes_;
@@ -69,7 +69,8 @@ class Value {
   std::size_t at_ = 0;
 };
 
-/// nullopt: the length varies, or Fast DDS does not read the parameter.
+/// The length of the value of parameter `id`. nullopt: the length varies, or Fast DDS does not read
+/// the parameter.
 std::optional<std::size_t> fixed_length(std::uint16_t id) {
   constexpr std::size_t kKind = 4, kTime = 8, kLocator = 24, kGuid = 16;
   switch (id) {
@@ -117,7 +118,7 @@ std::optional<std::size_t> fixed_length(std::uint16_t id) {
 }  // namespace
 
 bool has_valid_lengths(std::uint16_t id, std::span<const std::uint8_t> bytes, bool little_endian) {
-  constexpr std::size_t kLongestText = 256;  // that Fast DDS accepts
+  constexpr std::size_t kLongestText = 256;  // longest text that Fast DDS accepts
   if (const auto length = fixed_length(id)) return bytes.size() == *length;
   Value value(bytes, little_endian);
   switch (id) {
@@ -144,8 +145,8 @@ bool has_valid_lengths(std::uint16_t id, std::span<const std::uint8_t> bytes, bo
 }
 
 bool authentication_has_valid_lengths(std::span<const std::uint8_t> message, bool little_endian) {
-  // Two identities of messages, and GUIDs of destination, its endpoint, and the endpoint of the
-  // source.
+  // The fixed part: two identities of messages, and the GUIDs of the destination, of its endpoint,
+  // and of the endpoint of the source.
   constexpr std::size_t kFixed = 2 * 24 + 3 * 16;
   Value value(message, little_endian);
   return value.skip(kFixed) && value.text() && value.tokens();

@@ -10,22 +10,22 @@ namespace {
 
 using namespace rtps_message;
 
-/// Longest announcement: those of abbe have less than 1 kB, with a TypeObject several. A stranger
-/// may announce thousands, with user data that is kept.
+/// Longest announcement in bytes. Those of abbe have less than 1 kB, with a TypeObject several kB.
+/// A foreign participant may announce thousands, with user data that Fast DDS keeps.
 constexpr std::size_t kLongestAnnouncement = 16384;
-/// Parameter of a participant: how long it counts as alive without a message. Three times the
-/// longest interval of announcements that is usual (30 s): a participant that announced an endless
-/// lease, and left, would stay in memory.
+/// Parameter of a participant: how long it counts as alive without a message (lease). The limit is
+/// three times the longest usual interval of announcements (30 s). A participant that announced an
+/// endless lease and left would stay in memory.
 constexpr std::uint16_t kParticipantLease = 0x0002;
 constexpr std::uint32_t kLongestLease_s = 100;
-/// Parameters that the topics of abbe do not need, and that end Fast DDS or take its memory:
+/// Parameters that the topics of abbe do not need and that crash Fast DDS or exhaust its memory:
 /// TypeInformation, TypeObject, TypeIdentifier, content filter, data sharing (Fast DDS).
 constexpr std::array<std::uint16_t, 5> kBlankedParameters{0x0075, 0x0072, 0x0069, 0x0035, 0x8006};
 constexpr std::uint16_t kEndpointGuid = 0x005a;
 
 void limit_lease(Reader& list, std::size_t offset) {
   constexpr std::size_t kToValue = 4, kLeaseBytes = 8;  // seconds, fraction
-  // Unsigned: negative numbers, which stand for an endless lease, are large.
+  // The comparison is unsigned: negative numbers, which mean an endless lease, are then large.
   if (list.u16(offset + 2) < kLeaseBytes || list.u32(offset + kToValue) < kLongestLease_s) return;
   list.put_u32(offset + kToValue, kLongestLease_s);
   list.put_u32(offset + kToValue + 4, 0);

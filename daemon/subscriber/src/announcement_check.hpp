@@ -1,15 +1,18 @@
 #pragma once
-/// The list of parameters with which a participant announces itself, a writer or a reader. Comes
-/// before any key is checked. Pure.
+/// Checks the list of parameters with which a participant announces itself, a writer or a reader.
+/// Announcements arrive before any key is checked. Pure.
 
 #include "submessage.hpp"
 
 namespace abbe::dds {
 
-/// What becomes of an announcement.
+/// The result of the check of an announcement.
 enum class Announcement {
-  Passes,       ///< without the parameters that must not be read, and with a limited lease
-  Malformed,    ///< too long, a value of a wrong length, or of another participant
+  /// the announcement passes; parameters that must not be read are blanked, and the lease is
+  /// limited
+  Passes,
+  /// the announcement is too long, has a value of a wrong length, or belongs to another participant
+  Malformed,
   DropMessage,  ///< the list does not conform to the standard: the message must be dropped
 };
 

@@ -38,7 +38,7 @@ class MessageFilter final : public rtps::ChainingTransport {
   void receive(rtps::TransportReceiverInterface* next, const eprosima::fastrtps::rtps::octet* bytes,
                uint32_t size, const eprosima::fastrtps::rtps::Locator_t& local,
                const eprosima::fastrtps::rtps::Locator_t& remote) override {
-    // Twice the longest message: where Fast DDS reads up to a length that a message only states, it
+    // Twice the longest message. If Fast DDS reads up to a length that a message only states, it
     // stays within this buffer.
     thread_local std::vector<std::uint8_t> buffer(2 * kLongestMessage);
     if (size > kLongestMessage) return;

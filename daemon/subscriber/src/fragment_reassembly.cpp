@@ -10,10 +10,10 @@ namespace {
 
 using namespace rtps_message;
 
-constexpr std::size_t kDataBytes = 20;  // of a DATA submessage before its payload
+constexpr std::size_t kDataBytes = 20;  // length of a DATA submessage before its payload
 constexpr std::size_t kSamplePayloadAt = kHeaderBytes + kSubmessageHeaderBytes + kDataBytes;
 
-/// The message up to the payload, and room for the payload.
+/// The message up to the payload, with space for the payload.
 std::vector<std::uint8_t> message_for(const Fragment& fragment) {
   std::vector<std::uint8_t> message(kSamplePayloadAt + fragment.sample_size);
   std::ranges::copy(fragment.header, message.begin());

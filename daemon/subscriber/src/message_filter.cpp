@@ -36,7 +36,8 @@ std::optional<std::uint64_t> next_of(const Submessage& submessage, std::size_t a
   return submessage.window->next_of(writer);
 }
 
-/// Whether a reliable reader may keep `number` of the writer whose entity id is at `at`.
+/// True if `number`, of the writer whose entity id is at `at`, is so near that a reliable reader
+/// may keep it.
 bool is_near(const Submessage& submessage, std::size_t at, std::uint64_t number,
              std::uint64_t ahead = SequenceWindow::kAhead) {
   if (submessage.window == nullptr) return true;
@@ -47,7 +48,7 @@ bool announces_endpoint(std::uint32_t writer) {
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;
 }
 
-/// Whether Fast DDS can calculate with the sequence number at `at`: it asserts that the high word
+/// True if Fast DDS can calculate with the sequence number at `at`: it asserts that the high word
 /// is not the largest. A writer that sends a million samples a second reaches kMost in 146,000
 /// years.
 bool is_countable(const Submessage& submessage, std::size_t at) {
@@ -56,7 +57,8 @@ bool is_countable(const Submessage& submessage, std::size_t at) {
 }
 
 /// Replaces a DATA submessage by a GAP of its sequence number: a reliable reader counts the sample
-/// as received, and its history does not change. Too short for a GAP: the submessage is skipped.
+/// as received, and its history does not change. If the submessage is too short for a GAP, it is
+/// skipped.
 void replace_by_gap(const Submessage& data) {
   constexpr std::size_t kGapBytes = 28;  // reader, writer, start, base of the list, its 0 bits
   constexpr std::size_t kSequenceNumberAt = 12;
@@ -83,20 +85,20 @@ void replace_by_gap(const Submessage& data) {
   data.flags &= kLittleEndian;
 }
 
-/// The encapsulation of every message of abbe, in one of the two byte orders: 00 00 or 00 01.
-/// Generated code throws at another one.
+/// True for the encapsulation of every message of abbe, 00 00 or 00 01 (the two byte orders).
+/// Generated code throws an exception for another encapsulation.
 bool is_plain_cdr(Bytes payload) {
   return payload[0] == 0 && payload[1] <= 1;
 }
 
-/// Whether Fast DDS can read `payload` as a message of authentication.
+/// True if Fast DDS can read `payload` as a message of authentication.
 bool is_readable_authentication(Bytes payload) {
   constexpr std::size_t kEncapsulationBytes = 4;
   return payload.size() >= kEncapsulationBytes && is_plain_cdr(payload) &&
          authentication_has_valid_lengths(payload.subspan(kEncapsulationBytes), payload[1] == 1);
 }
 
-/// False: the message must be dropped.
+/// Checks a DATA submessage. False: the message must be dropped.
 bool check_data(const Submessage& data) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kShortest = 20;
   constexpr std::size_t kShortestLivelinessPayload = 20;  // encapsulation, GUID prefix, kind
@@ -116,7 +118,8 @@ bool check_data(const Submessage& data) {
   }
   if (announces_endpoint(writer)) {
     const auto announcement = check_announcement(data);
-    // Skipped, it would keep the reader from all later announcements.
+    // A GAP replaces the announcement. If it were only skipped, the reader would wait for it and
+    // not take later announcements.
     if (announcement == Announcement::Malformed) replace_by_gap(data);
     return announcement != Announcement::DropMessage;
   }
@@ -141,13 +144,14 @@ bool check_data(const Submessage& data) {
   return true;
 }
 
-/// `submessage` is one that passes.
+/// True for a message of authentication. Requires a submessage that has passed the checks.
 bool is_authentication(const Submessage& submessage) {
   return submessage.kind == kData && entity_id(submessage.body, 8) == kAuthenticationWriter;
 }
 
-/// Fast DDS drops the rest of a message at the first signed submessage for which it has no key yet.
-/// Cyclone DDS may send its last message of authentication, which gives the key, behind one.
+/// Moves a message of authentication into a message of its own. Fast DDS drops the rest of a
+/// message at the first signed submessage for which it has no key yet, and Cyclone DDS may send its
+/// last message of authentication, which gives the key, after such a submessage.
 void pass_alone(const Submessage& authentication) {
   std::vector<std::uint8_t> message(kHeaderBytes + kSubmessageHeaderBytes);
   std::ranges::copy(authentication.header, message.begin());
@@ -160,7 +164,7 @@ void pass_alone(const Submessage& authentication) {
   authentication.kind = kSkipped;
 }
 
-/// A fragment whose numbers are checked.
+/// Adds a fragment whose numbers have been checked.
 void add_to(Reassembly& reassembly, const Submessage& fragment) {
   constexpr std::size_t kIdsAt = 4, kFragmentsAt = 20, kPayloadAt = 32;
   const Reader reader = fragment.reader();
@@ -177,11 +181,12 @@ void add_to(Reassembly& reassembly, const Submessage& fragment) {
     reassembly.messages.push_back(*std::move(message));
 }
 
-/// Only the messages of DDS Security before it encrypts may be fragments: a message of abbe fits
-/// into one DATA submessage, and Fast DDS checks fragments insufficiently: without a payload behind
-/// their inline QoS it frees memory that is not its own. Those of authentication are reassembled
-/// and then checked. A fragment of an announcement cannot be checked alone; a GAP of its number
-/// lets the reader go on to later announcements.
+/// Checks a fragment. Only messages of DDS Security that are sent before encryption may be
+/// fragments, because a message of abbe fits into one DATA submessage. Fast DDS checks fragments
+/// insufficiently: if the payload after their inline QoS is missing, it frees memory that is not
+/// its own. Fragments of authentication are reassembled and then checked. A fragment of an
+/// announcement cannot be checked alone; a GAP of its number lets the reader continue with later
+/// announcements.
 void check_fragment(const Submessage& fragment) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kFragmentsAt = 20, kShortest = 32;
   const Bytes body = fragment.body;
@@ -197,7 +202,7 @@ void check_fragment(const Submessage& fragment) {
   constexpr std::uint16_t kToPayload = kShortest - kToInlineQos;
   const Reader reader = fragment.reader();
   if (fragment.has(kInlineQos | kWithData) || reader.u16(2) != kToPayload ||
-      body.size() == kShortest)  // of a fragment kWithData means "with key"
+      body.size() == kShortest)  // for a fragment, kWithData means "with key"
     return;
 
   const std::uint64_t first = reader.u32(kFragmentsAt), count = reader.u16(kFragmentsAt + 4),
@@ -212,9 +217,9 @@ void check_fragment(const Submessage& fragment) {
   }
 }
 
-/// Fast DDS marks each number of a gap: a long one would stop it for ever, and need all memory. A
-/// history of abbe covers fewer numbers than kLongestGap. It keeps the numbers that lie ahead of
-/// the one that the reader waits for.
+/// True if the gap is short. Fast DDS marks each number of a gap; a long gap would block it and
+/// exhaust the memory. A history of abbe covers fewer numbers than kLongestGap. Numbers ahead of
+/// the number that the reader waits for are kept by Fast DDS.
 bool is_short_gap(const Submessage& gap) {
   constexpr std::size_t kWriterAt = 4, kStartAt = 8, kBaseAt = 16, kBitsAt = 24, kShortest = 28;
   constexpr std::uint64_t kLongestGap = 1024, kMostBits = 256;
@@ -227,8 +232,9 @@ bool is_short_gap(const Submessage& gap) {
          is_near(gap, kWriterAt, base + bits - 1);
 }
 
-/// Fast DDS counts one by one to the first number of a heartbeat. A far one is brought nearer: the
-/// writer repeats its heartbeat, and the reader comes nearer each time.
+/// Limits the first number of a heartbeat. Fast DDS counts one by one up to this number. A distant
+/// number is replaced by a nearer one: the writer repeats its heartbeat, and the reader comes
+/// nearer each time.
 void limit_heartbeat(const Submessage& heartbeat) {
   constexpr std::size_t kWriterAt = 4, kFirstAt = 8, kLastAt = 16;
   if (!is_countable(heartbeat, kFirstAt) || !is_countable(heartbeat, kLastAt)) {
@@ -244,8 +250,9 @@ void limit_heartbeat(const Submessage& heartbeat) {
   if (allowed < first - next) reader.put_sequence_number(kFirstAt, next + allowed);
 }
 
-/// Fast DDS delivers to the reader that a submessage names, also from an unknown writer: the
-/// content would be checked as that of another writer.
+/// True if the reader belongs to the kind of the writer. Fast DDS delivers to the reader that a
+/// submessage names, also from an unknown writer; the content would then be checked as that of
+/// another writer.
 bool is_for_its_reader(const Submessage& submessage) {
   const bool is_data = submessage.kind == kData || submessage.kind == kDataFrag;
   const bool is_of_writer = is_data || submessage.kind == kHeartbeat || submessage.kind == kGap ||
@@ -258,13 +265,15 @@ bool is_for_its_reader(const Submessage& submessage) {
   if (writer == 0) return false;
   if (reader == 0) return true;
   if (is_users(writer)) return is_users(reader);
-  // Of the same number; kinds c2 and c7, c3 and c4 belong together.
+  // Writer and reader must have the same number; kinds c2 and c7, and kinds c3 and c4, belong
+  // together.
   const std::uint32_t kind = (writer & 0xff) == 0xc2 ? 0xc7 : 0xc4;
   return reader == ((writer & 0xffff'ff00) | kind);
 }
 
-/// With keys Fast DDS 2.9 accepts samples without signature as those of the participant whose GUID
-/// they state. Announcements of participants and authentication come before there are keys to sign.
+/// True if the submessage may be unsigned. With keys, Fast DDS 2.9 accepts samples without
+/// signature as if the participant whose GUID they state had sent them. Announcements of
+/// participants and authentication are sent before there are keys for signatures.
 bool may_be_unsigned(const Submessage& submessage) {
   switch (submessage.kind) {
     case kData:
@@ -299,7 +308,7 @@ bool check(const Submessage& submessage) {
     case kHeartbeat:
       limit_heartbeat(submessage);
       return true;
-    case kAckNack:  // base of the list
+    case kAckNack:  // offset of the base of the list
       if (!is_countable(submessage, 8)) submessage.kind = kSkipped;
       return true;
     case kGap:
@@ -311,9 +320,9 @@ bool check(const Submessage& submessage) {
         submessage.kind = kSkipped;
       return true;
     case kInfoTimestamp:
-      // Without time stamps the sample that arrives last is the newest. With them a sample dated in
-      // the future would keep all later ones of its instance out of the history, and Fast DDS 2.9
-      // loses the memory of each sample that it does not add for this reason.
+      // Time stamps are removed, so that the sample that arrives last is the newest. With them, a
+      // sample dated in the future would keep all later samples of its instance out of the history,
+      // and Fast DDS 2.9 leaks the memory of each sample that it does not add for this reason.
       if (!submessage.is_signed) submessage.flags |= kNoTimestamp;
       return true;
     default:

@@ -7,11 +7,11 @@ namespace {
 
 using namespace rtps_message;
 
-/// CryptoHeader: kind, key id, session id, suffix of the initialisation vector. CryptoFooter: MAC,
-/// number of the receivers' MACs, each of them with its key id.
+/// Sizes. CryptoHeader: kind, key id, session id, suffix of the initialisation vector.
+/// CryptoFooter: MAC, and number of the receivers' MACs, each with its key id.
 constexpr std::size_t kCryptoHeaderBytes = 20, kCryptoFooterBytes = 20, kReceiverMacBytes = 20;
 
-/// DDS Security states its numbers big-endian, whatever the byte order of the submessage.
+/// A number of DDS Security. It is big-endian, whatever the byte order of the submessage.
 std::uint32_t number_at(std::span<const std::uint8_t> body, std::size_t at) {
   return FieldReader(body, false).u32(at);
 }
@@ -23,7 +23,7 @@ bool is_crypto_footer(std::span<const std::uint8_t> body) {
          (body.size() - kCryptoFooterBytes) % kReceiverMacBytes == 0;
 }
 
-/// Encrypted octets behind their number.
+/// True if the body consists of encrypted octets after their number.
 bool is_secure_body(std::span<const std::uint8_t> body) {
   constexpr std::size_t kCountBytes = 4;
   return body.size() >= kCountBytes && number_at(body, 0) <= body.size() - kCountBytes;

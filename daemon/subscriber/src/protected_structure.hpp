@@ -14,17 +14,19 @@ namespace abbe::dds {
 /// Follows the submessages of one message from the first to the last.
 class ProtectedStructure {
  public:
-  /// `first` of the message. `open`: the length is 0, "up to the end". Returns whether the
-  /// submessage is protected: Fast DDS drops it if its signature is wrong. nullopt: the structure
-  /// is wrong.
+  /// Takes the next submessage. `first`: it is the first of the message. `open`: its length is 0,
+  /// "up to the end". Returns true if the submessage is protected: Fast DDS drops it if its
+  /// signature is wrong. nullopt: the structure is wrong.
   [[nodiscard]] std::optional<bool> next(std::uint8_t kind, std::span<const std::uint8_t> body,
                                          bool first, bool open);
-  /// What began has ended.
+  /// True if every structure that began has also ended.
   [[nodiscard]] bool is_complete() const;
 
  private:
-  enum class Message { Plain, Signed, Ended };        ///< behind SRTPS_PREFIX and SRTPS_POSTFIX
-  enum class Submessage { None, Begun, HasContent };  ///< behind SEC_PREFIX and its content
+  /// Signed: after SRTPS_PREFIX; Ended: after SRTPS_POSTFIX
+  enum class Message { Plain, Signed, Ended };
+  /// Begun: after SEC_PREFIX; HasContent: after the protected submessage
+  enum class Submessage { None, Begun, HasContent };
 
   Message message_ = Message::Plain;
   Submessage submessage_ = Submessage::None;

@@ -33,7 +33,7 @@ class FieldReader {
     const std::uint32_t a = u16(at), b = u16(at + 2);
     return little_endian_ ? a | b << 16 : a << 16 | b;
   }
-  /// High word first, in either byte order.
+  /// The sequence number at `at`: high word first, in either byte order.
   [[nodiscard]] std::uint64_t sequence_number(std::size_t at) const {
     return std::uint64_t{u32(at)} << 32 | u32(at + 4);
   }

@@ -27,7 +27,7 @@ void SequenceWindow::sent(std::span<const std::uint8_t> message) {
       addressed = true;
     }
     if (kind != kAckNack || !addressed || length < kShortest) continue;
-    // 0: the reader does not know yet which numbers there are.
+    // base 0 means that the reader does not know yet which numbers exist
     const auto base = FieldReader(body, little_endian).sequence_number(kBaseAt);
     if (base == 0) continue;
     std::copy_n(body.begin() + kWriterAt, 4, writer.begin() + kPrefixBytes);

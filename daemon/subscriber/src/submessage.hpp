@@ -29,7 +29,8 @@ struct Submessage {
   std::uint8_t& kind;
   std::uint8_t& flags;
   Bytes body;
-  /// Signed by DDS Security: a change would make the receiver drop it. Its sender is trusted.
+  /// Signed by DDS Security: a change would make the receiver drop the submessage. Its sender is
+  /// trusted.
   bool is_signed = false;
   std::span<const std::uint8_t, kHeaderBytes> header;  ///< with the GUID prefix of the sender
   const SequenceWindow* window = nullptr;              ///< nullptr: numbers are not limited
@@ -40,11 +41,12 @@ struct Submessage {
 
 /// An entity id is four bytes in big-endian order, whatever the byte order of the submessage.
 [[nodiscard]] std::uint32_t entity_id(Bytes bytes, std::size_t at);
-/// A user's writer or reader, not one of those that every participant has [DDSI-RTPS 2.5, 9.3.1.2].
+/// True for a user's writer or reader, false for those that every participant has [DDSI-RTPS 2.5,
+/// 9.3.1.2].
 [[nodiscard]] bool is_users(std::uint32_t entity);
 
 /// Calls use(id, offset of the id) for every parameter of the list that begins at `at`. Returns the
-/// offset behind the sentinel that ends the list. Returns nullopt if the length of a parameter is
+/// offset after the sentinel that ends the list. Returns nullopt if the length of a parameter is
 /// not a multiple of four, as the standard requires [DDSI-RTPS 2.5, 9.4.2.11], or exceeds the list:
 /// DDS implementations interpret such a list differently.
 template <class Use>
@@ -61,10 +63,10 @@ std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, U
   return std::nullopt;
 }
 
-/// What a DATA submessage contains, by offsets in its body.
+/// The contents of a DATA submessage, by offsets in its body.
 struct DataLayout {
-  std::size_t payload = 0;  ///< behind the inline QoS
-  bool not_alive = false;   ///< the status says disposed or unregistered
+  std::size_t payload = 0;  ///< offset of the payload, after the inline QoS
+  bool not_alive = false;   ///< the status states that the instance is disposed or unregistered
 };
 
 /// Finds the payload, and blanks the key hash of a user's sample. nullopt if the submessage does

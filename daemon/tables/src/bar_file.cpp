@@ -1,4 +1,4 @@
-// bar.toml: a calibrated Multi-Feature Bar.
+// Reads bar.toml: a calibrated Multi-Feature Bar.
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
@@ -45,7 +45,8 @@ class PointReader {
       variances.segment<3>(3 * static_cast<Eigen::Index>(i)) = u_m_[i].cwiseAbs2();
     return variances.asDiagonal();
   }
-  /// A fault for each point without u_um, except hole 1: its point has none by definition.
+  /// Adds a fault for each point without u_um. Hole 1 needs none, because its point is exact by
+  /// definition.
   void require_u(Section& root) {
     for (Section& point : root.children("point")) {
       const toml::node* hole = point.node("hole");
@@ -78,7 +79,8 @@ class PointReader {
     u_m_[i] = u_m;
   }
 
-  /// False if the point is that of another hole or bar.
+  /// Adds a fault and returns false if the point lies so far away that it belongs to another hole
+  /// or bar.
   bool check_place(Section& point, std::size_t i, const calib::Vector3& p_m) {
     const calib::Vector3 nominal_m(pattern_->hole_x_m[i], pattern_->hole_y_m[i], 0.0);
     const double beside_m = (p_m - nominal_m).norm();
@@ -94,8 +96,8 @@ class PointReader {
     return false;
   }
 
-  /// The bar axes are defined by hole 1 and by y and z of the last hole: these coordinates are 0,
-  /// and so are their uncertainties (`key` u_um; empty: the coordinates).
+  /// Checks the coordinates that define the bar axes: all of hole 1, and y and z of the last hole.
+  /// They are 0, and so are their uncertainties. `key`: u_um, or empty for the coordinates.
   void check_fixed(Section& point, std::string_view key, std::size_t i,
                    const calib::Vector3& value) {
     constexpr std::array<std::string_view, 3> kKeys{"x_mm", "y_mm", "z_mm"};
@@ -116,7 +118,7 @@ class PointReader {
   std::size_t with_u_ = 0;
 };
 
-/// A square matrix, row by row; nullopt after a fault.
+/// Reads a square matrix, row by row; nullopt after a fault.
 std::optional<Eigen::MatrixXd> read_matrix(Section& section, std::string_view key, Unit unit,
                                            Eigen::Index size) {
   const toml::node* node = section.node(key);
@@ -190,7 +192,7 @@ void read_uncertainty(Section& root, PointReader& points, Bar& out) {
   calibration.close();
 }
 
-/// Two numbers, the second larger than the first.
+/// Reads two numbers; the second must be larger than the first.
 bool get_interval(Section& section, std::string_view key, std::array<double, 2>& out) {
   std::vector<double> given;
   if (!section.get(key, given, kMilli, Need::Required)) return false;

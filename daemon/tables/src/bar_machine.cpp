@@ -1,4 +1,4 @@
-// The machine of an identification with a Multi-Feature Bar.
+// Checks the machine for an identification with a Multi-Feature Bar.
 #include <fmt/format.h>
 
 #include "abbe/result/try.hpp"

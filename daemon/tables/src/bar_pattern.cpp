@@ -1,4 +1,4 @@
-// [pattern] of bar.toml: where the features of a Multi-Feature Bar are touched.
+// Reads [pattern] of bar.toml: the places at which the features of a Multi-Feature Bar are touched.
 #include "bar_pattern.hpp"
 
 #include <fmt/format.h>
@@ -15,7 +15,8 @@ namespace {
 using calib::mfb::TouchPattern;
 
 constexpr Unit kDegrees{180.0 / std::numbers::pi};
-// At most: far above any bar, and far below the memory of a computer.
+// Limits of the numbers. The upper limits are far above any real bar, and far below the memory of a
+// computer.
 constexpr std::size_t kFewestBarHoles = 3, kMostBarHoles = 100, kMostBarTouches = 20000;
 
 std::vector<double> sorted(std::vector<double> values) {
@@ -23,7 +24,8 @@ std::vector<double> sorted(std::vector<double> values) {
   return values;
 }
 
-/// Reads the coordinates of one direction of a pattern: at least `least`, all different.
+/// Reads the coordinates of one direction of a pattern. There must be at least `least`, all
+/// different.
 void read_coordinates(Section& pattern, std::string_view key, std::vector<double>& out, Unit unit,
                       std::size_t least) {
   if (!pattern.get(key, out, unit, Need::Required)) return;
@@ -76,7 +78,8 @@ void read_rod_axes(Section& pattern, TouchPattern& out) {
                                 holes[j + 1] * kMmPerM));
 }
 
-/// A cylinder needs points at three angles on two levels, a plane a rectangle of points.
+/// Reads the places of the touches. A cylinder needs points at three angles on two levels, a plane
+/// needs a rectangle of points.
 void read_touched_places(Section& pattern, TouchPattern& out) {
   pattern.get("hole_radius_mm", out.hole_radius_m, kMilli, kPositive, Need::Required);
   read_coordinates(pattern, "hole_levels_mm", out.hole_levels_m, kMilli, 2);
@@ -111,7 +114,7 @@ calib::mfb::BarTouches touches_of(const TouchPattern& pattern) {
   return touches;
 }
 
-/// Whether the nominal touches determine all features.
+/// Adds a fault if the nominal touches do not determine all features.
 void check_determined(Section& pattern, const TouchPattern& given) {
   if (given.count() > kMostBarTouches) {
     pattern.fault("", fmt::format("{} touches, at most {}", given.count(), kMostBarTouches));

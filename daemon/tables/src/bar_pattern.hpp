@@ -1,5 +1,5 @@
 #pragma once
-/// [pattern] of bar.toml.
+/// Reads [pattern] of bar.toml.
 
 #include "abbe/base/faults.hpp"
 #include "abbe/calib/mfb/run/bar.hpp"

@@ -1,4 +1,4 @@
-// plan.toml: the measurements of a calibration with a Multi-Feature Bar.
+// Reads plan.toml: the measurements of a calibration with a Multi-Feature Bar.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using calib::mfb::Measurement;
 using calib::mfb::PassDirection;
 using calib::mfb::Plan;
 
-/// Why a row of points.csv cannot name this measurement; empty if it can.
+/// The reason why a row of points.csv cannot contain this name of a measurement; empty: it can.
 std::string_view fault_of_name(std::string_view name) {
   constexpr std::string_view kBlank = " \t";
   if (name.find_first_of(",\r\n\"") != std::string_view::npos)
@@ -31,7 +31,7 @@ std::string_view fault_of_name(std::string_view name) {
   return name.front() == '#' ? "begins with #, as a comment does in the file of the touches" : "";
 }
 
-/// Reads a direction of any length except 0; a unit vector.
+/// Reads a direction of any length except 0; `out` is a unit vector.
 bool get_direction(Section& section, std::string_view key, calib::Vector3& out,
                    Need need = Need::Optional) {
   calib::Vector3 given = calib::Vector3::Zero();
@@ -45,7 +45,7 @@ bool get_direction(Section& section, std::string_view key, calib::Vector3& out,
   return true;
 }
 
-/// The measurements of a plan, read one after the other.
+/// Reads the measurements of a plan, one after the other.
 class MeasurementReader {
  public:
   explicit MeasurementReader(bool needs_temperature) : needs_temperature_(needs_temperature) {}
@@ -93,7 +93,7 @@ class MeasurementReader {
     return false;
   }
 
-  /// Measurements of one clamping have one pose.
+  /// Checks that all measurements of one clamping have the same pose.
   void check_same_pose(Section& section, const Measurement& m) {
     constexpr double kSame_m = 1e-9, kSame_rad = 1e-9;
     const auto [at, is_new] = poses_.try_emplace(m.position, m);
@@ -112,7 +112,7 @@ class MeasurementReader {
   bool needs_temperature_;
   std::vector<Measurement> measurements_;
   std::set<std::string> names_;
-  std::map<std::string, Measurement> poses_;  ///< by position
+  std::map<std::string, Measurement> poses_;  ///< poses by position
 };
 
 void read_noise(Section noise, calib::mfb::TouchNoise& out) {

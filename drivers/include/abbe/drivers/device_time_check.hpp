@@ -48,8 +48,8 @@ class DeviceTimeCheck {
 
  private:
   bool known_ = false;
-  int agreeing_ = 0;  ///< refused points in a row whose times agree with each other
-  protocol::DeviceTime last_{};  ///< time of the last point that was not refused
+  int agreeing_ = 0;                  ///< refused points in a row whose times agree with each other
+  protocol::DeviceTime last_{};       ///< time of the last point that was not refused
   protocol::DeviceTime candidate_{};  ///< time of the last point that was refused
 };
 

@@ -56,7 +56,7 @@ struct TrackerFile {
   TimesOfFile times{};
   enum class Frame {
     Spherical,
-    Tracker,  ///< columns tracker_x_mm, tracker_y_mm, tracker_z_mm
+    Tracker,   ///< columns tracker_x_mm, tracker_y_mm, tracker_z_mm
     Unstated,  ///< columns x_mm, y_mm, z_mm
     /// after place_tracker(): the tracker is at the origin, the axes are those of the frame of the
     /// file
@@ -109,7 +109,7 @@ struct VerificationFile {
   std::vector<calib::verify::MeasuredPoint> points{};
   /// line of each point in the file; empty if the points do not come from a file
   std::vector<std::size_t> lines{};
-  std::size_t repeated = 0;             ///< rows left out because they repeat another row
+  std::size_t repeated = 0;  ///< rows left out because they repeat another row
   /// file with the readings of points that another program exported
   std::optional<InputFile> readings{};
 };

@@ -19,7 +19,7 @@ struct RunFiles {
   std::string path, tracker;  ///< files; both are given, or `recording`
   /// recording of the daemon with a run along a path, instead of `path` and `tracker`
   std::string recording;
-  std::string encoder;        ///< empty: no scale readings
+  std::string encoder;  ///< empty: no scale readings
   /// Tool reference point to reflector; nullopt: [target] offset_mm of the machine.
   std::optional<calib::Vector3> target_offset_m{};
   /// Position of the tracker in machine coordinates, accurate to 0.5 m; nullopt: that of the
@@ -37,7 +37,7 @@ struct RunFiles {
 struct ArrayFiles {
   std::string name;                 ///< default: "array 1", ...
   std::string touches, calibrator;  ///< files; both are given, or `errors`
-  std::string errors;  ///< file of errors, instead of `touches` and `calibrator`
+  std::string errors;               ///< file of errors, instead of `touches` and `calibrator`
   /// Tool reference point to stylus tip; nullopt: [target] offset_mm of the machine.
   std::optional<calib::Vector3> tip_offset_m{};
   std::optional<int> positions{};  ///< required number of positions; nullopt: that of [evemu], or 8

@@ -15,7 +15,7 @@ struct MeasuredOptions {
   std::string file;  ///< measured.csv or .rtl; empty: no comparison with a file
   std::string straightness = "end-points";
   double u_um = 0.0, u_urad = 0.0, u_ppm = 0.0;  ///< standard uncertainties of the device, k = 1
-  std::string error{}, line{}, unit{};  ///< information that an .rtl file does not contain
+  std::string error{}, line{}, unit{};           ///< information that an .rtl file does not contain
 };
 
 struct MeasuredComparison {

@@ -21,7 +21,7 @@ namespace abbe::daemon {
 /// The options that name the data. An empty name means that the file is not given.
 struct EvemuInputArguments {
   std::string machine, touches, calibrator, errors, recording, rotation_reference;
-  std::optional<int> order, positions;  ///< without a value: as in [evemu]
+  std::optional<int> order, positions;             ///< without a value: as in [evemu]
   std::optional<double> artefact_C, u_artefact_K;  ///< both or none
   std::optional<double> u_reference_um{};          ///< required with rotation_reference
   bool rotation_known = false, scales_corrected = false;
@@ -37,7 +37,7 @@ struct EvemuInput {
   /// refuses the model if the recording is damaged
   std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};
   std::string recording_gap{};
-  ObservedTimes observed{};  ///< times of the recording; nullopt for files
+  ObservedTimes observed{};   ///< times of the recording; nullopt for files
   protocol::UtcOffset utc{};  ///< offset of the host clock of the recording
 };
 

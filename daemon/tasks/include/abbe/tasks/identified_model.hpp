@@ -44,7 +44,7 @@ struct ResultPlace {
   std::string out;      ///< folder, created if needed
   std::string keep;     ///< store, or empty
   std::string command;  ///< recorded in the store as reason, "abbe identify otf"
-  std::string pdf{};  ///< file for the report as PDF; or empty
+  std::string pdf{};    ///< file for the report as PDF; or empty
 };
 /// File contents by file name.
 using ResultFiles = std::map<std::string, std::string>;

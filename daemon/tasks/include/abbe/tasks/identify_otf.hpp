@@ -21,10 +21,10 @@ namespace abbe::daemon {
 struct IdentifyOtfArguments {
   std::string machine, path, tracker, encoder, recording, keep, mode, tables;
   std::optional<std::string> estimator;  // without a value: as in [otf]
-  std::size_t segment_samples = 0;  // 0: segments are formed by travel
-  std::optional<double> u_scale_ppm;  // without a value: as in the configured tracker
-  std::string backlash;  // empty: as in [otf]
-  std::string smoothness;  // empty: as in [otf]
+  std::size_t segment_samples = 0;       // 0: segments are formed by travel
+  std::optional<double> u_scale_ppm;     // without a value: as in the configured tracker
+  std::string backlash;                  // empty: as in [otf]
+  std::string smoothness;                // empty: as in [otf]
   double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
   std::vector<std::string> targets;          // X,Y,Z=FILE, one per run

@@ -19,7 +19,7 @@ namespace abbe::daemon {
 struct IdentifyJointArguments {
   std::string machine, parts, keep;
   std::optional<std::string> estimator;  // estimator for the runs; without a value: as in [otf]
-  std::optional<double> u_scale_ppm;  // without a value: as in the configured tracker
+  std::optional<double> u_scale_ppm;     // without a value: as in the configured tracker
   double false_alarm = calib::joint::JointOptions{}.false_alarm;
   bool scales_corrected = false, accept_path_orientation = false;
 };
@@ -29,7 +29,7 @@ struct PartFacts {
   std::string name, method, files;
   std::size_t observations = 0;
   std::optional<calib::VolumetricModel> own_model{};  ///< tables; nullopt for an array or a bar
-  calib::Verdict verdict;  ///< verdict on this part alone
+  calib::Verdict verdict;                             ///< verdict on this part alone
 };
 
 struct JointInput {
@@ -45,8 +45,8 @@ struct JointInput {
   Config config;
   std::vector<InputFile> sources;
   std::optional<calib::joint::CommonTables> common{};  ///< common tables of the first run
-  std::vector<calib::joint::Part> parts{};              ///< runs, arrays, bars
-  std::vector<PartFacts> facts{};                       ///< one per part
+  std::vector<calib::joint::Part> parts{};             ///< runs, arrays, bars
+  std::vector<PartFacts> facts{};                      ///< one per part
   /// observations of the runs; `runs` points to them
   std::deque<calib::otf::Observations> observations{};
   std::vector<calib::joint::RunOfPart> runs{};

@@ -28,7 +28,7 @@ struct ModelAtPoints {
 struct Verification {
   std::vector<ModelAtPoints> models;         ///< in the order of the arguments; at least one
   calib::verify::Observations observations;  ///< observations at all places
-  std::size_t inside = 0;  ///< number of places that are compared
+  std::size_t inside = 0;                    ///< number of places that are compared
   std::vector<InputFile> inputs;
   std::vector<std::size_t> lines;  ///< line numbers of the shots in their file; may be empty
   std::size_t repeated = 0;        ///< rows of the file that repeat another row and are left out

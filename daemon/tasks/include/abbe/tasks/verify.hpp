@@ -36,7 +36,7 @@ struct VerifyArguments {
   std::string points, recording;
   /// Measures points on the running machine.
   std::function<Result<LivePoints>(const KeepPoints&, const AcceptMachine&)> live{};
-  std::string out;  ///< folder in which measured points are kept; empty: they are not kept
+  std::string out;      ///< folder in which measured points are kept; empty: they are not kept
   std::string details;  ///< certificate.toml; empty: none
   std::string tool, frame = "fit", origin, grid, planes;
   std::optional<double> least_distance_mm{};

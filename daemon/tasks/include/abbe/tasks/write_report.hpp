@@ -18,7 +18,7 @@ namespace abbe::daemon {
 struct ReportArguments {
   std::string model;
   std::string compare;   ///< empty: no comparison
-  std::string as_left;  ///< for a certificate: model measured after the adjustment; may be empty
+  std::string as_left;   ///< for a certificate: model measured after the adjustment; may be empty
   std::string details;   ///< certificate.toml, or empty
   std::string out;       ///< HTML file; empty: report-ID.html, compare-ID.html or trend-ID.html
   std::string pdf, dcc;  ///< files; empty: not wanted
@@ -30,7 +30,7 @@ struct ReportArguments {
 /// The files that write_report() writes.
 struct MadeReport {
   std::string page, certificate;  ///< HTML; XML
-  VerdictInWords verdict;  ///< verdict on the model
+  VerdictInWords verdict;         ///< verdict on the model
   std::string out, pdf, dcc;      ///< files; empty: not wanted, except `out`
 };
 

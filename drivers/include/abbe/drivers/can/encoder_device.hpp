@@ -173,7 +173,7 @@ class EncoderDevice final : public Device {
   std::array<ReceivedFrame, CanBus::kMostRead> came_{};       ///< read from the bus
   std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< for the receiver
   std::size_t batch_count_ = 0;
-  bool all_read_ = true;            ///< CanRead::all
+  bool all_read_ = true;  ///< CanRead::all
   /// valid if all_read_: all frames that arrived earlier were read
   protocol::HostTime cycle_end_{};
   std::uint8_t raw_sequence_ = 0;

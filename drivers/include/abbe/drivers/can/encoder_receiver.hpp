@@ -198,12 +198,12 @@ class EncoderReceiver {
     double offset = 0.0;        ///< reading at count 0
     std::uint64_t modulus = 0;  ///< 0: 2^64
     bool seen = false;
-    bool answers = false;             ///< node has answered since boot-up or the last SYNC pause
-    bool reply_outstanding = false;   ///< the answer to an earlier SYNC may still arrive
+    bool answers = false;            ///< node has answered since boot-up or the last SYNC pause
+    bool reply_outstanding = false;  ///< the answer to an earlier SYNC may still arrive
     /// regular cycles until the axis is settled; 0: it is settled
     std::uint8_t cycles_to_hold = 0;
-    std::uint64_t raw = 0;            ///< the latest count as sent, modulo `modulus`
-    std::uint16_t emergency = 0;      ///< the latest code; 0: none
+    std::uint64_t raw = 0;        ///< the latest count as sent, modulo `modulus`
+    std::uint16_t emergency = 0;  ///< the latest code; 0: none
     bool heartbeat_lost = false;
     std::optional<protocol::HostTime> last_heartbeat;
   };

@@ -53,10 +53,10 @@ class SocketCanBus final : public CanBus {
   SocketCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
-  int sync_fd_ = -1;          ///< CAN_BCM socket; closing it ends the SYNC
+  int sync_fd_ = -1;  ///< CAN_BCM socket; closing it ends the SYNC
   /// start_sync() was called since open(): SYNCs of the kernel may still arrive after a stop
   bool kernel_sent_ = false;
-  bool sent_sync_ = false;    ///< send() has sent a SYNC since open()
+  bool sent_sync_ = false;  ///< send() has sent a SYNC since open()
   /// true: an earlier socket of this object has sent a SYNC that may still arrive. Therefore a SYNC
   /// from this computer that is not an echo of the open socket is ignored.
   bool left_over_ = false;

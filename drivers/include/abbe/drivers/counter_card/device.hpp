@@ -113,14 +113,14 @@ class CounterCardDevice final : public Device {
   std::span<const UsbEvent> events_;  ///< of the latest wait(), for the session in the next wait()
   protocol::HostTime cycle_end_{};
   protocol::HostTime read_until_{};  ///< the latest wait() read all earlier events
-  std::size_t scans_ = 0;  ///< number of scans in the latest receive()
+  std::size_t scans_ = 0;            ///< number of scans in the latest receive()
   bool out_of_step_reported_ = false;
   std::uint64_t faults_seen_ = 0;
   std::uint64_t gaps_seen_ = 0;
   std::uint64_t disagreements_seen_ = 0;
   std::uint64_t restarts_seen_ = 0;
   std::uint64_t withheld_seen_ = 0;
-  bool clock_reported_ = false;  ///< a rate error beyond the limit was reported
+  bool clock_reported_ = false;   ///< a rate error beyond the limit was reported
   CounterCardProgress progress_;  ///< the latest state
   std::uint32_t raw_sequence_ = 0;
 

@@ -117,7 +117,7 @@ class CounterCardReceiver {
   };
   /// Counters of an earlier run, until it is known whether they have continued.
   struct Resumption {
-    protocol::HostTime since{};  ///< time of `last_`
+    protocol::HostTime since{};               ///< time of `last_`
     std::optional<protocol::HostTime> begun;  ///< arrival of the first withheld scan
     double least_behind_s = 0.0;
     bool refused = false;

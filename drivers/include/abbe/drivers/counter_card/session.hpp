@@ -170,7 +170,7 @@ class CounterCardSession {
   bool halt_ = false;
   bool scans_since_fault_ = false;
   bool set_up_ = false;  ///< this session or an earlier run has set the counters up
-  std::string serial_;  ///< serial number of the card whose counters were set up
+  std::string serial_;   ///< serial number of the card whose counters were set up
   /// The card was opened with counters set up before; no scan has confirmed yet that they continue.
   bool resuming_ = false;
   bool resumed_again_ = false;  ///< the scan was restarted once because it was out of step

@@ -14,7 +14,7 @@ struct EnvironmentLink {
   ModbusLine line;
   /// incremented at each opening; a device that has stored another number restarts its reading
   std::uint64_t openings = 0;
-  std::uint64_t answers = 0;  ///< number of answers of all devices
+  std::uint64_t answers = 0;         ///< number of answers of all devices
   protocol::HostTime open_at{};      ///< earliest time to open the line again
   protocol::HostTime quiet_until{};  ///< bytes until then are a late answer and are discarded
 };

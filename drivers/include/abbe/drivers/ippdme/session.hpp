@@ -136,7 +136,7 @@ struct IppAbortRequested {
   std::string_view reason = "stopped by request";  ///< reason of the hold; a string literal
 };
 struct IppReleaseRequested {};  ///< input: an operator has inspected the machine
-struct IppMotionStored {};  ///< input in state Storing: the motion may be sent
+struct IppMotionStored {};      ///< input in state Storing: the motion may be sent
 /// Input in Storing: the motion must not be sent.
 struct IppMotionNotStored {
   std::string why;
@@ -301,8 +301,8 @@ class IppSession {
   bool close_then_ = false;
   bool held_ = false;  ///< true until the machine is released
   std::string hold_reason_;
-  std::string last_note_;       ///< latest fault without the peer and the reason of a hold
-  std::string stop_reason_;     ///< last_note_ when AbortE was sent
+  std::string last_note_;     ///< latest fault without the peer and the reason of a hold
+  std::string stop_reason_;   ///< last_note_ when AbortE was sent
   std::string asked_reason_;  ///< reason of a request to stop that found no connection; empty: none
   bool session_first_ = false;  ///< start a session before AbortE: the server requires one
   bool may_home_;

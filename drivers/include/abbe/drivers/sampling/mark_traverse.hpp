@@ -46,7 +46,7 @@ class MarkTraverse {
   std::size_t count_ = 0;
   std::size_t refusals_ = 0;
   bool moving_ = false;  ///< a position is known
-  int direction_ = 0;  ///< direction of travel; 0: unknown
+  int direction_ = 0;    ///< direction of travel; 0: unknown
   double farthest_ = 0.0;
   bool reversed_ = false;  ///< the direction has changed since the latest mark
 };

@@ -78,7 +78,7 @@ class BurstTimes {
   Counters counters_;
   protocol::HostTime arrival_{};
   bool beam_lost_ = false;
-  protocol::SampleFlags pending_flags_ = 0;   ///< for the next point
+  protocol::SampleFlags pending_flags_ = 0;  ///< for the next point
   /// device time of the last point with a time that fits
   std::optional<protocol::DeviceTime> last_;
   std::array<Verdict, kMostPoints> verdicts_{};

@@ -26,7 +26,7 @@ struct TrackerOrder {
   };
   What what = What::ListReflectors;
   std::uint64_t number = 0;  ///< identifies the order in its report
-  std::string reflector;  ///< for SetReflector: name or id
+  std::string reflector;     ///< for SetReflector: name or id
   /// For FindReflector: approximate distance of the reflector, 0 to kLongestSearch_m.
   double distance_m = 0.0;
 };

@@ -295,7 +295,7 @@ class TrackerSession {
   std::optional<std::int32_t> reflector_in_use_;
   /// reflector that was set before the configured one
   std::optional<std::int32_t> reflector_before_;
-  std::optional<TrackerOrder> order_;             ///< accepted, not yet reported
+  std::optional<TrackerOrder> order_;  ///< accepted, not yet reported
   bool order_begun_ = false;
   std::optional<TrackerOrderReport> report_;
 };

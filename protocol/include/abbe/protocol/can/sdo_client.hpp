@@ -89,7 +89,7 @@ class SdoClient {
   HostTime deadline_{};
   unsigned attempts_left_ = 0;
   std::size_t size_ = 0;                    ///< number of valid bytes of `buffer_`
-  std::size_t sent_ = 0;  ///< number of bytes sent of a segmented download
+  std::size_t sent_ = 0;                    ///< number of bytes sent of a segmented download
   std::optional<std::uint32_t> announced_;  ///< size the server announced for a segmented upload
   std::array<std::byte, kMaxSdoBytes> buffer_{};
   std::array<CanFrame, 4> outbox_{};  ///< at most abort + new initiate per event

@@ -45,7 +45,7 @@ class FragmentReassembly {
     std::array<std::uint8_t, 16> ids;
     std::uint32_t fragment_size;
     std::vector<std::uint8_t> message;  ///< has space for the whole sample
-    std::vector<bool> received;  ///< one element per fragment
+    std::vector<bool> received;         ///< one element per fragment
     std::size_t missing;
   };
   Sample* sample_of(const Fragment& fragment);

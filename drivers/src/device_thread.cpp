@@ -101,7 +101,7 @@ struct DeviceThread::State {
     failures.fetch_add(1, std::memory_order_release);
   }
 
-  /// Stops what the device moves. True: the motion may go on.
+  /// Stops the motion of the device. True: the motion may continue.
   [[nodiscard]] bool motion_goes_on() noexcept {
     try {
       return device.stop_after_failure();

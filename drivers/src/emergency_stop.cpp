@@ -11,11 +11,11 @@
 namespace abbe::drivers {
 namespace {
 
-// Fixed memory: a signal handler reads it.
+// Memory of fixed size, because a signal handler reads it.
 std::array<std::atomic<EmergencyStop*>, kMostEmergencyStops> registered_stops{};
-// Calls of send_emergency_stops() that run. Sequentially consistent, as the registered objects and
-// their sockets are: either the call sees that the object or socket is gone, or await_senders()
-// sees the call.
+// Number of running calls of send_emergency_stops(). This counter, the registered objects and their
+// sockets are accessed with sequential consistency. Thus either the call sees that the object or
+// socket is gone, or await_senders() sees the call.
 std::atomic<int> senders{0};
 
 void await_senders() noexcept {
@@ -57,7 +57,7 @@ void EmergencyStop::set_socket(int fd) noexcept {
   if (before >= 0 && before != fd) await_senders();
 }
 
-/// Reads until the confirmation was seen. It may arrive in pieces, so the end of what was read
+/// Reads until the confirmation was received. It may arrive in pieces, so the end of the bytes read
 /// before is kept.
 bool EmergencyStop::confirmed(int fd, std::chrono::milliseconds within) const noexcept {
   std::array<char, 512> bytes;  // NOLINT(cppcoreguidelines-pro-type-member-init): recv() fills it
@@ -87,7 +87,8 @@ EmergencyStops send_emergency_stops(std::chrono::milliseconds within) noexcept {
   EmergencyStops done;
   senders.fetch_add(1);
 
-  // First all commands, then all confirmations: no machine waits for another one.
+  // All commands are sent first; only then the confirmations are read, so that no machine waits for
+  // another.
   for (const auto& place : registered_stops) {
     const EmergencyStop* const stop = place.load();
     if (stop == nullptr || !stop->moving_.load(std::memory_order_acquire)) continue;

@@ -75,15 +75,16 @@ struct HostAddresses::Shared {
       addresses = std::move(*found);
     answered.notify_all();
   }
-  /// As keep() after an internal error, usually no memory: the known addresses and the last fault
-  /// stay.
+  /// Ends a look-up after an internal error, usually a lack of memory. The known addresses and the
+  /// last fault stay.
   void give_up() noexcept {
     const std::lock_guard lock(mutex);
     running = false;
     answered.notify_all();
   }
-  /// On a thread of its own. It inherits the real-time priority of the device thread, which a name
-  /// service must not have; if the change is refused, it keeps it.
+  /// Runs on a separate thread. The thread inherits the real-time priority of the device thread.
+  /// This priority is removed for the name service; if the system refuses this, the thread keeps
+  /// it.
   void run(const HostLookUp& look_up) noexcept {
     const sched_param none{};
     (void)::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &none);
@@ -122,7 +123,7 @@ void HostAddresses::begin_look_up() {
   }
 
   try {
-    // Detached: no thread that ends waits for a name service.
+    // The thread is detached, so that no thread has to wait for a name service when it ends.
     std::thread([shared = shared_, look_up = options_.look_up] { shared->run(look_up); }).detach();
   } catch (const std::system_error& refused) {
     shared_->keep(tl::unexpected{

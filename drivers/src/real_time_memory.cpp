@@ -25,8 +25,8 @@ std::vector<std::string> lock_now() {
   std::vector<std::string> refusals;
   if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0)
     refusals.push_back(refusal("disabling huge pages"));
-  // Two calls: in one call with all three flags, MCL_ONFAULT would apply to the memory that is
-  // mapped now, which would not be loaded.
+  // Two calls are necessary: in one call with all three flags, MCL_ONFAULT would also apply to the
+  // memory that is mapped now, which would then not be loaded.
   if (mlockall(MCL_CURRENT) != 0 || mlockall(MCL_FUTURE | MCL_ONFAULT) != 0)
     refusals.push_back(refusal("mlockall") + " (CAP_IPC_LOCK or LimitMEMLOCK=infinity is needed)");
   return refusals;

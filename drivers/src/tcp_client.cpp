@@ -57,7 +57,7 @@ Result<void> TcpClient::open() {
     return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", error_text(error)));
   }
 
-  opening_ = true;  // also if connect() is already complete: wait() then reports Established
+  opening_ = true;  // also if connect() is complete at once: wait() then reports Established
   return {};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// abbe-linuxcnc-encoder: gives abbed the scale readings of a LinuxCNC control as CANopen encoders
-// on CAN over UDP. It reads the stream of the realtime component `sampler`.
+// abbe-linuxcnc-encoder: sends to abbed the scale readings of a LinuxCNC control as CANopen
+// encoders on CAN over UDP. It reads the stream of the realtime component `sampler`.
 #include <arpa/inet.h>
 #include <hal.h>
 #include <netinet/in.h>
@@ -31,10 +31,13 @@ using namespace abbe::linuxcnc;
 using abbe::protocol::ExitCode;
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kIo = number(ExitCode::Io), kInternal = number(ExitCode::Internal);
-constexpr int kSamplerKey = 0x48534130;  // of sampler.0 in LinuxCNC 2.9; the others follow
-constexpr char kColumns[] = "ffffffb";   // cfg= of the sampler: motor (3), offset (3), homed
+// key of sampler.0 in LinuxCNC 2.9; further samplers have the following keys
+constexpr int kSamplerKey = 0x48534130;
+// columns (cfg=) of the sampler: motor (3), offset (3), homed
+constexpr char kColumns[] = "ffffffb";
 constexpr std::chrono::microseconds kPollPeriod{200};
-constexpr std::chrono::milliseconds kReportPeriod{100};  // between two reported changes
+// shortest time between two reported changes
+constexpr std::chrono::milliseconds kReportPeriod{100};
 
 volatile sig_atomic_t stop_requested = 0;
 
@@ -50,7 +53,8 @@ struct Options {
 /// The component in HAL, attached to the stream of a sampler.
 class SamplerStream {
  public:
-  /// The name is that of this process: after a program that was killed its name stays in HAL.
+  /// The name contains the id of this process, because the name of a program that was killed stays
+  /// in HAL.
   explicit SamplerStream(int channel)
       : id_(hal_init(("abbe-encoder-" + std::to_string(::getpid())).c_str())) {
     if (id_ < 0) return;
@@ -66,7 +70,7 @@ class SamplerStream {
 
   [[nodiscard]] bool attached() const { return attached_; }
 
-  /// All samples that are waiting.
+  /// Reads all waiting samples.
   void read(std::vector<ServoSample>& samples) {
     samples.clear();
     hal_stream_data values[HAL_STREAM_MAX_PINS];
@@ -96,7 +100,7 @@ int open_socket(std::uint16_t local_port, const std::string& peer_name, std::uin
   local.sin_port = htons(local_port);
   peer.sin_port = htons(peer_port);
   if (::inet_pton(AF_INET, peer_name.c_str(), &peer.sin_addr) != 1) return -1;
-  // To a peer on this computer the socket is on loopback, too.
+  // If the peer is on this computer, the socket is also bound to the loopback interface.
   if ((ntohl(peer.sin_addr.s_addr) >> 24) == 127) local.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
 
   const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -108,7 +112,7 @@ int open_socket(std::uint16_t local_port, const std::string& peer_name, std::uin
   return -1;
 }
 
-/// Prints why the control has no positions, or that it has, when this changes.
+/// Prints changes of the state: why the control has no positions, or that it has positions.
 class Reporter {
  public:
   void report(const Causes& causes, std::chrono::steady_clock::time_point now) {
@@ -157,7 +161,7 @@ int run(const Options& options) {
   std::vector<ServoSample> samples;
   std::uint8_t sequence = 0;
   std::uint64_t sent = 0;
-  stream.read(samples);  // those of the time before the start are discarded
+  stream.read(samples);  // discards the samples from before the start
   while (stop_requested == 0) {
     stream.read(samples);
     for (const ServoSample& sample : simulator < 0 ? std::vector<ServoSample>{} : samples) {

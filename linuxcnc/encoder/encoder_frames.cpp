@@ -31,7 +31,7 @@ double count_of(const ServoSample& sample, std::size_t joint, const EncoderBusOp
 Causes causes_of(const ServoSample& sample, const EncoderBusOptions& options) {
   Causes causes;
   for (std::size_t joint = 0; joint < kEncoderJoints; ++joint) {
-    // NaN is not within the range either.
+    // the comparison is also false for NaN
     const bool fits = std::abs(count_of(sample, joint, options)) <=
                       double{std::numeric_limits<std::int32_t>::max()};
     if (!sample.homed) {
@@ -47,7 +47,7 @@ std::string describe(const Causes& causes) {
   std::string text;
   for (std::size_t joint = 0; joint < causes.size(); ++joint) {
     if (!causes[joint]) continue;
-    // Homing is a state of the whole control.
+    // Homing is a state of the whole control, so one text is enough.
     if (causes[joint] == ControlCause::NotHomed)
       return std::string(can::to_text(ControlCause::NotHomed)) + ": abbed receives no positions";
     text += (text.empty() ? "joint " : "; joint ") + std::to_string(joint) + ": " +
@@ -82,7 +82,7 @@ std::vector<std::byte> encoder_datagram(const ServoSample& sample, std::uint8_t 
 }
 
 Emergencies EmergencySchedule::choose(std::uint32_t number, const Causes& causes) {
-  // Unsigned: the number of a servo cycle may wrap.
+  // The difference is unsigned, because the number of a servo cycle may wrap.
   if (causes_ == causes && number - sent_ < kRepeatCycles) return Emergencies::Omitted;
   causes_ = causes;
   sent_ = number;
@@ -104,7 +104,7 @@ std::optional<ServoSample> Decimation::choose(std::span<const ServoSample> read)
   std::optional<ServoSample> due;
   for (const ServoSample& sample : read) {
     if (due) {
-      due.reset();  // a newer sample was waiting already
+      due.reset();  // a newer sample is already waiting
       ++late_;
     }
     if (sample.number % every_ == 0) due = sample;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
-/// The joints of LinuxCNC as CANopen encoders on CAN over UDP, for `[encoder] transport = "udp"`
-/// and `sync = "external"` of abbed. Pure.
+/// Sends the joints of LinuxCNC as CANopen encoders on CAN over UDP, for `[encoder] transport =
+/// "udp"` and `sync = "external"` of abbed. Pure.
 
 #include <array>
 #include <cstddef>
@@ -21,7 +21,7 @@ inline constexpr std::size_t kEncoderJoints = 3;
 /// One servo cycle, from the stream of LinuxCNC's `sampler`. Lengths in mm.
 struct ServoSample {
   std::uint32_t number = 0;
-  std::array<double, kEncoderJoints> motor_mm{};   ///< at the scale: feedback of the motor
+  std::array<double, kEncoderJoints> motor_mm{};   ///< feedback of the motor, as read at the scale
   std::array<double, kEncoderJoints> offset_mm{};  ///< joint.N.motor-offset
   bool homed = false;
 
@@ -32,23 +32,24 @@ struct ServoSample {
 };
 
 struct EncoderBusOptions {
-  int first_node = 1;      ///< of joint 0; the others follow
-  double step_mm = 10e-6;  ///< of one count: step_nm = 10 in abbed.toml
+  int first_node = 1;      ///< node of joint 0; the other joints have the following nodes
+  double step_mm = 10e-6;  ///< step of one count; this is step_nm = 10 in abbed.toml
 };
 
-/// Why each joint has no position to send; nullopt: it has one.
+/// For each joint: why it has no position to send; nullopt: it has one.
 using Causes = std::array<std::optional<protocol::can::ControlCause>, kEncoderJoints>;
 [[nodiscard]] Causes causes_of(const ServoSample& sample, const EncoderBusOptions& options);
 
-/// In words: "LinuxCNC is not homed: abbed receives no positions", "joint 1: ...", or that abbed
-/// receives the positions.
+/// The causes as text: "LinuxCNC is not homed: abbed receives no positions", "joint 1: ...", or
+/// that abbed receives the positions.
 [[nodiscard]] std::string describe(const Causes& causes);
 
 enum class Emergencies { Omitted, Included };
 
-/// One datagram: SYNC, and the answer of every node (TPDO 1: the position, 32 bits). There is no
-/// answer, and the axis is missing in abbe, before homing and for a reading that is not finite or
-/// beyond 32 bits. With `emergencies` it contains one of each node: the cause, or error reset.
+/// One datagram: SYNC, and the answer of every node (TPDO 1: the position, 32 bits). Before homing,
+/// and for a reading that is not finite or exceeds 32 bits, a node does not answer, and abbe marks
+/// the axis as missing. With `emergencies` the datagram also contains one emergency of each node:
+/// the cause, or error reset.
 [[nodiscard]] std::vector<std::byte> encoder_datagram(const ServoSample& sample,
                                                       std::uint8_t sequence,
                                                       const EncoderBusOptions& options,
@@ -60,7 +61,7 @@ class EmergencySchedule {
  public:
   static constexpr std::uint32_t kRepeatCycles = 1000;  ///< servo cycles: 1 s at 1 kHz
 
-  /// `number`: of the servo cycle that is sent.
+  /// `number`: number of the servo cycle that is sent.
   [[nodiscard]] Emergencies choose(std::uint32_t number, const Causes& causes);
 
  private:
@@ -68,18 +69,22 @@ class EmergencySchedule {
   std::uint32_t sent_ = 0;  ///< servo cycle of the latest emergencies
 };
 
-/// What abbe-sim receives of every servo cycle. A reading that is not finite counts as not homed.
+/// The record of a servo cycle for abbe-sim. A reading that is not finite counts as not homed.
 [[nodiscard]] protocol::PositionRecord position_record(const ServoSample& sample,
                                                        std::uint32_t period_ns);
 
-/// Chooses which samples are sent: every n-th, and only the newest of those read together. abbed
-/// dates a SYNC by its arrival, so a sample that waited must not be sent as if it were new.
+/// Chooses the samples that are sent: every n-th sample, and of the samples read together only the
+/// newest. The reason: abbed dates a SYNC by its arrival, so a sample that has waited must not be
+/// sent as a new one.
 class Decimation {
  public:
   explicit Decimation(std::uint32_t every) : every_(every) {}
-  /// The sample to send, if any, of those that one read returned.
+  /// The sample to send, from the samples that one read returned; nullopt: none.
   [[nodiscard]] std::optional<ServoSample> choose(std::span<const ServoSample> read);
-  [[nodiscard]] std::uint64_t late() const { return late_; }  ///< due samples that were not sent
+  [[nodiscard]] std::uint64_t late() const {
+    return late_;
+  }  ///< number of due samples that were
+     ///< not sent
 
  private:
   std::uint32_t every_;

@@ -37,8 +37,10 @@ using linuxcnc::LatestUsable;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kMillimetre = 1e-3;
-constexpr std::chrono::milliseconds kDecisionPeriod{20};  // of the DDS rule
-constexpr std::chrono::milliseconds kReportPeriod{100};   // at which changes are reported
+// period of the decision that the DDS rule requires
+constexpr std::chrono::milliseconds kDecisionPeriod{20};
+// shortest time between two reported changes
+constexpr std::chrono::milliseconds kReportPeriod{100};
 
 constexpr unsigned kExitDeadline_s = 3;
 
@@ -61,9 +63,8 @@ int fail(const std::string& text, daemon::ExitCode code) {
   return number(code);
 }
 
-/// Prints whether the correction is applied, and why not, when this changes. In a thread of its
-/// own:
-/// a terminal that is halted, or a full pipe, delays neither the decisions nor the loop.
+/// Prints changes of the state: whether the correction is applied, and why not. It has a separate
+/// thread, so that a halted terminal or a full pipe delays neither the decisions nor the loop.
 class Reporter {
  public:
   explicit Reporter(const ControlLink& link) : link_(link) {}
@@ -90,7 +91,7 @@ class Reporter {
     const auto sent = link_.sent();
     if (!sent) return {};
     const std::lock_guard lock(mutex_);
-    if (sent->valid != 0 && model_id_.empty()) return {};  // withdrawn since then
+    if (sent->valid != 0 && model_id_.empty()) return {};  // the model was withdrawn meanwhile
     return sent->valid != 0 ? "correction of model " + model_id_
                             : std::string("no correction: ") + sent->reason;
   }
@@ -100,7 +101,7 @@ class Reporter {
   std::string model_id_;
 };
 
-/// Thread of the subscription.
+/// Function of the subscription's thread.
 void decide(const std::stop_token& stop, linuxcnc::Subscription& subscription, LatestUsable& latest,
             Reporter& reporter) {
   while (!stop.stop_requested()) {
@@ -113,7 +114,7 @@ void decide(const std::stop_token& stop, linuxcnc::Subscription& subscription, L
   }
 }
 
-/// SCHED_FIFO for the calling thread, the loop.
+/// Sets SCHED_FIFO for the calling thread, which runs the loop.
 void take_priority(int priority) {
   sched_param parameters{};
   parameters.sched_priority = priority;
@@ -124,7 +125,8 @@ void take_priority(int priority) {
                priority, std::strerror(errno));
 }
 
-/// After a delay of a second, as of a process that was stopped, the cycles in between are omitted.
+/// Waits for the next cycle. After a delay of more than a second, for example of a process that was
+/// stopped, the missed cycles are omitted.
 void wait_for_next(timespec& next, long period_us) {
   constexpr long kSecond_ns = 1'000'000'000;
   timespec now{};
@@ -135,7 +137,7 @@ void wait_for_next(timespec& next, long period_us) {
   ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &next, nullptr);
 }
 
-/// Until a signal, or LinuxCNC ends: returns the reason of the latter.
+/// Runs until a signal arrives or LinuxCNC ends; in the second case returns the reason.
 std::string feed(const Options& options, ControlLink& link, LatestUsable& latest) {
   linuxcnc::FeedOptions feed_options;
   feed_options.clamp_m = options.clamp_mm * kMillimetre;
@@ -180,12 +182,14 @@ int run(const Options& options) {
 
   take_priority(options.priority);
   const std::string ended = feed(options, *link, latest);
-  ::alarm(kExitDeadline_s);  // a thread that cannot write to a halted terminal does not end
+  ::alarm(kExitDeadline_s);  // ends the process even if a thread cannot end because it writes to a
+                             // halted terminal
   if (ended.empty() || link->closed()) return number(ExitCode::Done);
   return fail(ended, ExitCode::Refused);
 }
 
-/// Child processes of --restart: these codes do not change by themselves.
+/// True for exit codes after which --restart starts no new child process, because the cause would
+/// remain.
 bool is_final(int code) {
   using daemon::ExitCode;
   for (const auto last : {ExitCode::Done, ExitCode::BadInput, ExitCode::Refused})
@@ -197,7 +201,7 @@ void stop_on_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
-  ::signal(SIGPIPE, SIG_IGN);  // the reader of the output has ended
+  ::signal(SIGPIPE, SIG_IGN);  // the reader of the output may have ended
 }
 
 int run_caught(const Options& options) {

@@ -13,11 +13,12 @@
 namespace abbe::linuxcnc {
 namespace {
 
-/// A feeder whose process exists, but which does not write for this time, is replaced: it hangs, or
-/// another program has its process id.
+/// If the process of a feeder exists but does not write for this time, the feeder is replaced: it
+/// hangs, or another program has its process id.
 constexpr std::chrono::milliseconds kLongestPause{300};
-/// Without a servo cycle for this time LinuxCNC counts as ended if no process of it is attached to
-/// the memory any more. One that stands, for example in a debugger, goes on.
+/// Without a servo cycle for this time, LinuxCNC counts as ended if none of its processes is
+/// attached to the memory any more. A LinuxCNC that is halted, for example in a debugger, does not
+/// count as ended.
 constexpr std::chrono::seconds kLongestStandstill{5};
 
 std::uint32_t wanted_number(const abbe_hand_over& memory) {
@@ -31,16 +32,17 @@ bool writes(const abbe_hand_over& memory, std::int32_t feeder) {
   return wanted_number(memory) != before;
 }
 
-/// True: this process is the feeder. False: another one is, in `other`.
+/// True: this process has become the feeder. False: another process is the feeder; its id is in
+/// `other`.
 bool become_feeder(abbe_hand_over& memory, std::int32_t& other) {
   other = __atomic_load_n(&memory.feeder, __ATOMIC_ACQUIRE);
   if (other != ::getpid() && writes(memory, other)) return false;
-  // Of two feeders that start at the same time one succeeds.
+  // If two feeders start at the same time, one of them succeeds.
   return __atomic_compare_exchange_n(&memory.feeder, &other, ::getpid(), false, __ATOMIC_ACQ_REL,
                                      __ATOMIC_ACQUIRE);
 }
 
-/// Of a memory whose state cannot be read: false.
+/// True if another process is attached to the memory; false if its state cannot be read.
 bool is_attached_elsewhere(int segment) {
   shmid_ds state{};
   return ::shmctl(segment, IPC_STAT, &state) == 0 && state.shm_nattch > 1;
@@ -68,7 +70,7 @@ std::optional<ControlLink> ControlLink::attach(int key, std::string& error) {
     error = "another abbe-linuxcnc-feeder runs (process " + std::to_string(other) + "); end it";
     return std::nullopt;
   }
-  // The values of the feeder before are not those of this one.
+  // the values of the previous feeder do not apply to this one
   abbe_wanted nothing{};
   std::strcpy(nothing.reason, "the feeder has started");
   link.write(nothing);
@@ -90,7 +92,7 @@ ControlLink::~ControlLink() {
 }
 
 const abbe_control& ControlLink::read() {
-  // The realtime thread preempts the feeder seldom within a copy; a second attempt succeeds.
+  // The realtime thread seldom preempts the feeder within a copy; a second attempt then succeeds.
   constexpr int kAttempts = 2;
   abbe_control control;
   std::uint32_t number = 0;
@@ -116,7 +118,7 @@ std::string ControlLink::ended(Clock::time_point now) {
   if (closed()) return "LinuxCNC has ended";
   if (__atomic_load_n(&memory_->feeder, __ATOMIC_ACQUIRE) != ::getpid())
     return "another abbe-linuxcnc-feeder has replaced this one, or LinuxCNC was started again";
-  // Before the first cycle LinuxCNC still loads its configuration.
+  // before the first cycle, LinuxCNC is still loading its configuration
   if (control_.cycle != seen_cycle_ || control_.cycle == 0) {
     seen_cycle_ = control_.cycle;
     cycled_at_ = now;

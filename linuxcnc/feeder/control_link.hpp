@@ -23,17 +23,19 @@ class ControlLink {
   ControlLink(ControlLink&& other) noexcept;
   ControlLink& operator=(ControlLink&&) = delete;
 
-  /// The values of the latest servo cycle; those of the call before while they are being written.
+  /// Returns the values of the latest servo cycle, or those of the previous call while the values
+  /// are being written.
   [[nodiscard]] const abbe_control& read();
   void write(const abbe_wanted& wanted);
 
-  /// Why the feeder has to end: LinuxCNC has ended (also without unloading abbe_correction), or
-  /// another feeder has replaced this one. Empty: it has not. For the thread that calls read().
+  /// Why the feeder must end: LinuxCNC has ended (perhaps without unloading abbe_correction), or
+  /// another feeder has replaced this one. Empty: it need not end. For the thread that calls
+  /// read().
   [[nodiscard]] std::string ended(Clock::time_point now);
   /// True: LinuxCNC has unloaded abbe_correction.
   [[nodiscard]] bool closed() const;
 
-  /// Any thread: what was written last; nullopt while it is being written.
+  /// The values that were written last; nullopt while they are being written. Any thread.
   [[nodiscard]] std::optional<abbe_wanted> sent() const;
 
  private:

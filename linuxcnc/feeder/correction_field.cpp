@@ -18,7 +18,8 @@ Vector from_mm(const double (&v_mm)[3]) {
   return Vector(v_mm[0], v_mm[1], v_mm[2]) * kMillimetre;
 }
 
-/// Not valid, with a formatted reason that is cut to the size of the memory.
+/// Values that are not valid, with a formatted reason, which is truncated to the size in the
+/// memory.
 template <class... Values>
 abbe_wanted refuse(fmt::format_string<Values...> reason, Values&&... values) {
   abbe_wanted refused{};
@@ -27,8 +28,9 @@ abbe_wanted refuse(fmt::format_string<Values...> reason, Values&&... values) {
   return refused;
 }
 
-/// As VolumetricModel::holds_for_tool() of a model for one tool: what is published does not show
-/// whether a model holds for more tools. An offset that is NaN refuses, too.
+/// True if the field holds for the tool offset, as VolumetricModel::holds_for_tool() for a model
+/// for one tool. The published data do not show whether a model holds for more tools. A tool offset
+/// that is NaN gives false.
 bool holds_for(const Vector& tool_m, const Usable& usable) {
   return (tool_m - usable.tool_offset_m).norm() <= kToolTolerance_m;
 }
@@ -45,7 +47,8 @@ abbe_wanted refuse_tool(const Vector& tool_m, int number, const Usable& usable) 
 
 std::optional<Eigen::Vector3d> command_correction(const daemon::ErrorLattice& field,
                                                   const Eigen::Vector3d& position_m) {
-  // Each pass multiplies the remaining error by the slope of V, 1e-3 at most: three give 1e-9 of c.
+  // Each pass multiplies the remaining error by the slope of V, which is at most 1e-3; three passes
+  // leave 1e-9 of c.
   constexpr int kPasses = 3;
   if (!position_m.allFinite()) return std::nullopt;
 
@@ -74,7 +77,7 @@ abbe_wanted wanted(const Usable& usable, double silence_s, const abbe_control& c
 
   const auto correction_m = command_correction(*usable.field, from_mm(control.position));
   if (!correction_m) return refuse("outside the volume of the model");
-  // A clamp that is NaN refuses, too.
+  // The comparison also refuses if the clamp is NaN.
   if (!(correction_m->cwiseAbs().maxCoeff() <= options.clamp_m))
     return refuse("the correction is larger than the clamp");
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
-/// Hands the latest decision of the subscription's thread to the loop of the feeder. Lock-free: the
-/// loop, which has a realtime priority, neither waits for the other thread nor allocates or frees.
+/// Passes the latest decision of the subscription's thread to the loop of the feeder. Lock-free:
+/// the loop, which has a realtime priority, neither waits for the other thread nor allocates or
+/// frees memory.
 
 #include <atomic>
 #include <chrono>
@@ -16,7 +17,8 @@ class LatestUsable {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Subscription's thread. Frees the decisions that the loop has passed. Never null.
+  /// For the subscription's thread. Also frees the decisions that the loop no longer reads.
+  /// `usable` is never null.
   void set(std::shared_ptr<const Usable> usable, Clock::time_point now) {
     if (kept_.back() != usable) {
       kept_.push_back(std::move(usable));
@@ -29,22 +31,22 @@ class LatestUsable {
     while (kept_.front().get() != in_use) kept_.pop_front();
   }
 
-  /// Loop. Valid until the next call.
+  /// For the loop. The reference is valid until the next call.
   [[nodiscard]] const Usable& get() {
     const Usable* const latest = latest_.load(std::memory_order_acquire);
     in_use_.store(latest, std::memory_order_release);
     return *latest;
   }
-  /// Loop: since the subscription's thread last decided.
+  /// For the loop: time since the last decision of the subscription's thread.
   [[nodiscard]] double silence_s(Clock::time_point now) const {
     const std::chrono::nanoseconds at{at_ns_.load(std::memory_order_relaxed)};
     return std::chrono::duration<double>(now.time_since_epoch() - at).count();
   }
-  /// Subscription's thread: decisions that are kept.
+  /// For the subscription's thread: number of decisions that are kept.
   [[nodiscard]] std::size_t kept() const { return kept_.size(); }
 
  private:
-  /// From the one that the loop may read to the latest.
+  /// The decisions from the one that the loop may be reading to the latest.
   std::deque<std::shared_ptr<const Usable>> kept_{std::make_shared<const Usable>()};
   std::atomic<const Usable*> latest_{kept_.back().get()};
   std::atomic<const Usable*> in_use_{kept_.back().get()};

@@ -16,16 +16,16 @@ namespace {
 
 constexpr timespec kPause{0, 500'000'000};
 
-/// Child: never returns.
+/// Runs the function in the child process. Never returns.
 [[noreturn]] void run_child(const std::function<int()>& run, const sigset_t& unblocked,
                             pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (::getppid() != parent) std::_Exit(EXIT_SUCCESS);  // it ended before prctl()
+  if (::getppid() != parent) std::_Exit(EXIT_SUCCESS);  // the parent ended before prctl()
   ::sigprocmask(SIG_SETMASK, &unblocked, nullptr);
   std::exit(run());
 }
 
-/// Waits for the end of the child; SIGTERM and SIGINT are passed on to it.
+/// Waits for the end of the child and forwards SIGTERM and SIGINT to it.
 int wait_for(pid_t child, const sigset_t& awaited, bool& stopped) {
   for (;;) {
     int status = 0;

@@ -11,10 +11,12 @@ namespace {
 
 using daemon::Topic;
 
-/// abbe-dds repeats ModelState every second; an older one is not valid (daemon/docs/dds.md).
+/// A ModelState older than this is not valid; abbe-dds repeats it every second
+/// (daemon/docs/dds.md).
 constexpr std::chrono::milliseconds kLongestSilence{1500};
 
-/// Malformed payloads are skipped: any participant of the domain may send them.
+/// Decodes the payload and calls `use`. Malformed payloads are skipped, because any participant of
+/// the domain may send them.
 template <class T, class Use>
 void with(const dds::Arrival& arrival, Use use) {
   if (auto value = daemon::decode<T>(arrival.payload)) use(std::move(*value));

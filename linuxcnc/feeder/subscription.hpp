@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// Subscribes to the model of one machine and decides by the rule of abbe_v1.idl whether its grid
-/// may be applied: the tool is compared by the loop of the feeder. Used by one thread.
+/// may be applied. The tool is not compared here, but in the loop of the feeder. Used by one
+/// thread.
 
 #include <chrono>
 #include <map>
@@ -19,7 +20,8 @@ namespace abbe::linuxcnc {
 
 struct SubscriptionOptions {
   std::string machine;
-  std::string machine_id = {};  ///< of the machine; empty: the first one of this name is pinned
+  /// identity of the machine; empty: the first identity with this name is pinned
+  std::string machine_id = {};
 };
 
 class Subscription {
@@ -34,8 +36,8 @@ class Subscription {
         readers_(readers),
         pin_(std::move(options.machine_id), dds::PublisherPin::kSilenceOfSlowTopics) {}
 
-  /// Waits for samples, at most `at_most`, and returns what may be applied now. The object is
-  /// replaced only when the decision changes. Never null.
+  /// Waits for samples, at most `at_most`, and returns the present decision. The returned object
+  /// changes only when the decision changes. Never null.
   [[nodiscard]] std::shared_ptr<const Usable> poll(std::chrono::milliseconds at_most);
 
  private:
@@ -46,7 +48,7 @@ class Subscription {
   };
 
   void take(const dds::Arrival& arrival);
-  /// Passes the sample to the pin; notes why a publisher is not used.
+  /// Passes the sample to the publisher pin, and stores the reason if a publisher is not used.
   void judge(const dds::Arrival& arrival, const dds::ParticipantId& from);
   void keep(const dds::Arrival& arrival, Publisher& publisher);
   [[nodiscard]] bool alive(const Publisher& publisher) const;
@@ -57,7 +59,7 @@ class Subscription {
   dds::Readers& readers_;
   dds::PublisherPin pin_;
   std::map<dds::ParticipantId, Publisher> publishers_;
-  std::string why_none_;  ///< why the last publisher that was heard is not used
+  std::string why_none_;  ///< why the publisher heard last is not used
   bool grid_changed_ = false;
   std::shared_ptr<const Usable> usable_ = std::make_shared<const Usable>();
 };

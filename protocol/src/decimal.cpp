@@ -29,7 +29,7 @@ std::string quoted_with_reason(std::string_view text, std::string_view reason) {
 
 std::string_view parse_decimal(std::string_view text, double& value) {
   if (text.empty()) return "empty";
-  if (text.front() == '+') {  // spreadsheets write it; std::from_chars does not accept it
+  if (text.front() == '+') {  // spreadsheets write a leading '+'; from_chars does not accept it
     text.remove_prefix(1);
     if (text.starts_with('-')) return "not a number";
   }

@@ -1,4 +1,5 @@
-// Use cases of the command line: identify from files, verify, plan, export. The same functions.
+// Use cases of the command line: identify from files, verify, plan, export. They call the same
+// functions as the command line.
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
@@ -29,7 +30,7 @@ namespace {
 
 using daemon::ModelDocument;
 
-/// Runs a task without the interpreter's lock.
+/// Runs a task while the lock of the Python interpreter is released.
 template <class Task>
 auto without_lock(const Task& task) {
   return value_or_raise([&task] {
@@ -97,7 +98,7 @@ py::list effects_of(const std::vector<daemon::ModelAtPoints>& models) {
   return out;
 }
 
-/// `as_list`: one entry per model.
+/// `as_list`: the result is a list with one entry per model.
 py::dict verify(const daemon::VerifyArguments& arguments, bool as_list) {
   std::optional<daemon::Error> cut_short;
   const auto v = without_lock([&] {
@@ -142,7 +143,7 @@ py::dict plan_otf(const daemon::PlanOtfArguments& arguments) {
   return out;
 }
 
-/// The report of the export, as `abbe export --json` prints it.
+/// Exports a model and returns the report that `abbe export --json` prints.
 py::object export_model(const daemon::ExportArguments& arguments) {
   const auto done = without_lock([&] {
     return export_model(arguments, [](const std::string&, const daemon::FoundModel&) {});

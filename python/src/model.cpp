@@ -28,7 +28,7 @@ using Points = py::array_t<double, py::array::c_style | py::array::forcecast>;
   throw Raised({daemon::ErrorCode::Usage, text, {}});
 }
 
-/// `points` must be (N, 3).
+/// Number of points; `points` must have the shape (N, 3).
 py::ssize_t rows_of(const Points& points, const char* name) {
   if (points.ndim() != 2 || points.shape(1) != 3)
     refuse(std::string{name} + ": must be an array of N x 3 numbers, in m");
@@ -70,7 +70,7 @@ calib::AxisTravel travel_of(const ModelDocument& document, const Direction& dire
   return travel;
 }
 
-/// (V_m (N, 3), cov_m2 (N, 3, 3), inside (N)).
+/// Returns (V_m (N, 3), cov_m2 (N, 3, 3), inside (N)).
 py::tuple error_at(const ModelDocument& document, const Points& points_m,
                    const std::optional<Vector3>& tool_m, const Direction& direction) {
   const py::ssize_t n = rows_of(points_m, "points_m");
@@ -87,14 +87,16 @@ py::tuple error_at(const ModelDocument& document, const Points& points_m,
     for (py::ssize_t i = 0; i < n; ++i) {
       const auto error = document.model.error_at(Vector3(at + 3 * i), tool, travel);
       Eigen::Map<Vector3>(to_V + 3 * i) = error.V_m;
-      Eigen::Map<calib::Matrix3>(to_cov + 9 * i) = error.cov_V_m2;  // symmetric
+      // the matrix is symmetric, so the order of its elements does not matter
+      Eigen::Map<calib::Matrix3>(to_cov + 9 * i) = error.cov_V_m2;
       to_inside[i] = error.inside && error.tool_ok;
     }
   }
   return py::make_tuple(V, cov, inside);
 }
 
-/// abbe.Error "refused" for a model that must not correct a machine, unless forced with a reason.
+/// Raises abbe.Error "refused" if the model must not correct a machine, unless it is forced with a
+/// reason.
 void require_use(const ModelDocument& document, bool force, const std::string& why) {
   if (force && why.empty()) refuse("force: needs why, the reason");
   const auto found = daemon::obstacles_to_use({.document = document});
@@ -105,7 +107,7 @@ void require_use(const ModelDocument& document, bool force, const std::string& w
                 found.refusals});
 }
 
-/// What a model file states of its verdict; None: not judged.
+/// The verdict in a model file; None: not judged.
 py::object verdict_of(const ModelDocument& document) {
   const auto& verdict = document.verdict;
   if (!verdict) return py::none();
@@ -123,7 +125,7 @@ std::vector<std::string> statements_of(const ModelDocument& document) {
       .statements;
 }
 
-/// (c_m (N, 3), inside (N)).
+/// Returns (c_m (N, 3), inside (N)).
 py::tuple correction_at(const ModelDocument& document, const Points& points_m,
                         const std::optional<Vector3>& tool_m, const Direction& direction,
                         bool force, const std::string& why) {
@@ -153,7 +155,7 @@ py::tuple correction_at(const ModelDocument& document, const Points& points_m,
   return py::make_tuple(c, inside);
 }
 
-/// Columns name, position_m, value and u, one row for each parameter.
+/// Returns the columns name, position_m, value and u, with one row for each parameter.
 py::dict parameters_of(const ModelDocument& document) {
   const auto parameters = document.model.parameters();
   const auto& covariance = document.model.covariance();

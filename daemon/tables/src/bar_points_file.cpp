@@ -1,4 +1,4 @@
-// The touches of a Multi-Feature Bar.
+// Reads the touches of a Multi-Feature Bar.
 #include <fmt/format.h>
 
 #include <array>
@@ -61,7 +61,7 @@ class TouchRows {
     lines_[measurement].push_back(table_.line(row));
   }
 
-  /// A fault for every measurement of the plan without a row.
+  /// Adds a fault for every measurement of the plan that has no row.
   void check_complete() {
     for (std::size_t i = 0; i < passes_.size(); ++i)
       if (!rows_of_.contains(i))
@@ -79,7 +79,7 @@ class TouchRows {
             table_.at(row, kX + 2) / kMmPerM};
   }
 
-  /// A whole number from `least` to `most`; nullopt after a fault.
+  /// The cell as a whole number from `least` to `most`; nullopt after a fault.
   std::optional<std::size_t> whole(std::size_t row, std::size_t column, std::string_view name,
                                    std::size_t least, std::size_t most, std::string_view of) {
     const double value = table_.at(row, column);
@@ -131,7 +131,8 @@ class TouchRows {
   std::map<std::tuple<std::size_t, Feature, std::size_t, Side, std::size_t>, std::size_t> seen_;
 };
 
-/// The travel widened by half a cell at each end: a touch reaches beyond the points of the bar.
+/// The travel, extended by half a cell at each end, because touches extend beyond the points of the
+/// bar.
 calib::MachineNodes widened(calib::MachineNodes nodes) {
   for (auto& axis : nodes) {
     auto& at = axis.nodes_m;
@@ -154,7 +155,8 @@ void check_readings(const NumberTable& table, const calib::MachineNodes& nodes, 
   const auto outside = calib::outside_travel(readings_m, travel);
   if (outside.empty()) return;
 
-  // A wrong axis or unit puts most readings outside, a bar that is too long only some.
+  // With a wrong axis or unit most readings are outside the travel; with a bar that is too long,
+  // only some are.
   const bool most = 2 * outside.size() > readings_m.size();
   const std::string fits = most ? calib::corrections_inside_travel(readings_m, travel) : "";
   for (const auto& [row, axis] : outside) {
@@ -189,7 +191,8 @@ double correlation_with_index(const PassTouches& touches) {
   return rows > 0.0 && indices > 0.0 ? product / std::sqrt(rows * indices) : 0.0;
 }
 
-/// The order of the rows is the time of the touches, from which the drift follows.
+/// The rows that run against the direction of their pass. The order of the rows is the order of the
+/// touches in time, from which the drift is estimated.
 std::vector<std::string> rows_against_pass(const std::string& file, const NumberTable& table,
                                            const std::vector<PassTouches>& passes,
                                            const std::vector<Measurement>& measurements) {

@@ -44,7 +44,7 @@ std::string bar_sag_toml(const calib::mfb::Sag& sag) {
       toml_list(sag.section_yz_m, kMmPerM), sag.density_kg_per_m3, kGiga * sag.youngs_modulus_Pa);
 }
 
-/// One row of the matrix per line; symmetric to the last digit.
+/// The covariance with one row of the matrix per line. It is symmetric to the last digit.
 std::string covariance_toml(const Eigen::MatrixXd& covariance_m2) {
   std::string text = "\n[calibration]\ncovariance_um2 = [\n";
   for (Eigen::Index i = 0; i < covariance_m2.rows(); ++i) {

@@ -15,7 +15,8 @@ namespace abbe::daemon {
 namespace {
 
 constexpr std::string_view kAxisNames = "XYZ";
-constexpr double kLongestMedians = 1.5;  // between neighbouring updates of a moving axis
+// longest interval between neighbouring updates of a moving axis, in median intervals
+constexpr double kLongestMedians = 1.5;
 constexpr std::string_view kLogAgain = "log with camonitor -f 6, without -t and -F";
 
 struct Update {
@@ -23,7 +24,7 @@ struct Update {
   std::size_t line = 0;
 };
 
-/// "2022-12-02" and "09:35:54.535389", two neighbouring fields of a line.
+/// The time in two neighbouring fields of a line, "2022-12-02" and "09:35:54.535389".
 std::optional<double> stamp_in(std::string_view date, std::string_view time) {
   const auto length = static_cast<std::size_t>(time.data() + time.size() - date.data());
   return seconds_of_stamp({date.data(), length});
@@ -46,7 +47,7 @@ class AxisUpdates {
   [[nodiscard]] const std::string& pv() const { return pv_; }
   [[nodiscard]] const std::vector<Update>& all() const { return updates_; }
 
-  /// A line of this PV.
+  /// Reads a line of this PV.
   void read(const TextLines& lines, const std::vector<std::string_view>& fields, Faults& faults) {
     const auto fault = [&](std::string_view kind, std::string_view at, const std::string& what) {
       faults.add_kind(kind, lines.number(), lines.column(at), pv_, what);
@@ -76,7 +77,7 @@ class AxisUpdates {
     add({*time_s, value, lines.number()}, fields[1], lines, faults);
   }
 
-  /// `metres_per_value`: the unit of the values.
+  /// Checks the updates. `metres_per_value`: unit of the values.
   void check(double metres_per_value, std::size_t last_line, Faults& faults) {
     if (updates_.empty())
       return faults.add(last_line, 1, pv_,
@@ -101,7 +102,7 @@ class AxisUpdates {
     longest_s_ = kLongestMedians * *middle;
   }
 
-  /// The value at `time_s`; nullopt if it is not known. Called with ascending times.
+  /// The value at `time_s`; nullopt if it is not known. Call it with ascending times.
   std::optional<double> at(double time_s) {
     if (updates_.empty() || time_s < updates_.front().time_s) return std::nullopt;
     while (next_ < updates_.size() && updates_[next_].time_s <= time_s) ++next_;
@@ -130,7 +131,7 @@ class AxisUpdates {
         faults.add_kind(
             "same time", lines.number(), lines.column(at), pv_,
             fmt::format("another value at the time of line {}: delete one of them", before->line));
-      return;  // an alarm that changed, or the first line of a subscription again
+      return;  // only an alarm has changed, or this is the first line after a new subscription
     }
     updates_.push_back(update);
   }
@@ -161,7 +162,7 @@ LogAxes read_updates(std::string_view text, const CamonitorOptions& options, Fau
   return axes;
 }
 
-/// All updates, ascending, one for each time.
+/// The times of all updates, ascending, each time once.
 std::vector<Update> times_of_updates(const LogAxes& axes) {
   std::vector<Update> times;
   for (const AxisUpdates& axis : axes)

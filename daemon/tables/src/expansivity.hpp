@@ -1,6 +1,6 @@
 #pragma once
-/// Thermal expansion of an artefact in its file: alpha_um_per_m_K and u_alpha_um_per_m_K, both or
-/// neither.
+/// Reads the thermal expansion of an artefact from its file: alpha_um_per_m_K and
+/// u_alpha_um_per_m_K, both or neither.
 
 #include <optional>
 
@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// Adds a fault if one of the keys is missing.
+/// Adds a fault if only one of the keys is given.
 inline void read_expansivity(Section& head, std::optional<calib::Expansivity>& out) {
   calib::Expansivity given;
   const bool alpha = head.get("alpha_um_per_m_K", given.alpha_per_K, kMicro, {-50.0, 50.0});

@@ -1,4 +1,4 @@
-// gauge.toml: a step gauge measured on the line of a bar.
+// Reads gauge.toml: a step gauge measured on the line of a bar.
 #include "abbe/tables/gauge_file.hpp"
 
 #include <fmt/format.h>
@@ -43,7 +43,7 @@ void read_gauge_head(Section head, StepGauge& out) {
   head.close();
 }
 
-/// [x, y, z] of each run. False after a fault, or without the key.
+/// Reads the readings [x, y, z] of each run. False after a fault, or if the key is missing.
 bool get_readings(Section& step, Need need, std::vector<calib::Vector3>& out) {
   constexpr std::string_view kKey = "readings_mm";
   const toml::node* node = step.node(kKey);
@@ -69,7 +69,8 @@ bool get_readings(Section& step, Need need, std::vector<calib::Vector3>& out) {
   return false;
 }
 
-/// Distances ascend from 0; every face has the same number of readings.
+/// Reads the faces of the gauge. Their distances must ascend from 0, and every face must have the
+/// same number of readings.
 void read_faces(Section& root, GaugeReadings readings, StepGauge& out) {
   const bool required = readings == GaugeReadings::Required;
   for (Section& step : root.children("step")) {

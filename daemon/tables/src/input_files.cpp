@@ -63,7 +63,7 @@ void check_path(ParsedTable& parsed) {
   }
 }
 
-// Variants of the file format.
+// Variants of the columns of tracker.csv.
 constexpr std::size_t kSpherical = 0, kTrackerFrame = 1, kUnstatedFrame = 2;
 
 struct Limits {
@@ -84,8 +84,8 @@ Limits limits_of(const NumberTable& table, std::size_t column) {
   return found;
 }
 
-/// "; they fit as degrees": the meaning with which all angles of a column are possible. Empty if
-/// none is.
+/// Text that names the unit in which all angles of a column would be possible, "; they fit as
+/// degrees". Empty if there is none.
 std::string azimuths_fit_as(const Limits& found) {
   if (Limits{-360.0, 360.0}.contain(found)) return "; they fit as degrees, or as gon";
   if (Limits{-400.0, 400.0}.contain(found)) return "; they fit as gon";
@@ -122,7 +122,7 @@ void check_spherical(ParsedTable& parsed) {
   }
 }
 
-/// Of a table with at least one row whose first column is the time.
+/// The times of a table that has at least one row and whose first column is the time.
 TimesOfFile times_of(const NumberTable& table) {
   return {.first_time_s = table.at(0, 0),
           .first_line = table.line(0),
@@ -203,7 +203,8 @@ Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
 
 namespace {
 
-/// A tracker measures no reflector that is nearer.
+/// Checks the distances of the points: a tracker cannot measure a reflector that is nearer than a
+/// limit.
 Result<void> check_distances(const TrackerFile& points, const std::filesystem::path& file,
                              std::string_view where, std::string_view advice) {
   constexpr double kNearest_m = 0.2;

@@ -21,7 +21,7 @@ using calib::direct::MeasuredError;
 enum MeasuredColumn : std::size_t { kName, kPosition, kValue, kUnit, kRun, kDirection, kLine };
 constexpr double kMicroPerUnit = 1e6;  // um per m, urad per rad
 
-/// ISO 230-1 names; squareness also without E, as in truth.csv.
+/// The names of all errors by ISO 230-1. Squareness is also accepted without E, as in truth.csv.
 std::vector<std::string> measured_names() {
   std::vector<std::string> names;
   for (const calib::Axis axis : calib::kAllAxes)
@@ -34,7 +34,7 @@ std::vector<std::string> measured_names() {
   return names;
 }
 
-/// Collects the rows of the errors.
+/// Collects the rows of each error.
 class MeasuredRows {
  public:
   MeasuredRows(const NumberTable& table, Faults& faults)

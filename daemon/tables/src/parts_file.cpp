@@ -95,7 +95,8 @@ void check_names(const PartsFile& parts, Section& root) {
   for (const BarFiles& bar : parts.bars) take("bar", bar.name);
 }
 
-/// Two instruments have no range offset in common.
+/// Adds a fault if runs with the same range_offset have different instruments, because two
+/// instruments cannot have a common offset.
 void check_range_offsets(const PartsFile& parts, Section& root) {
   std::map<std::string, const RunFiles*> first;
   for (const RunFiles& run : parts.runs) {

@@ -1,4 +1,4 @@
-// Reads lists of points; what becomes of them is in point_export_use.cpp.
+// Reads lists of points; point_export_use.cpp converts them.
 #include "abbe/tables/point_export.hpp"
 
 #include <fmt/format.h>
@@ -35,7 +35,7 @@ char separator_of_points(std::string_view line) {
   return ' ';
 }
 
-/// The text in the last brackets: "mm" of "X (mm)". Empty without.
+/// The text in the last brackets: "mm" in "X (mm)". Empty if there are no brackets.
 std::string_view in_brackets(std::string_view text) {
   const auto open = text.find_last_of("([");
   const auto close = text.find_last_of(")]");
@@ -43,7 +43,7 @@ std::string_view in_brackets(std::string_view text) {
   return without_blanks(text.substr(open + 1, close - open - 1));
 }
 
-/// The unit as an option names it; empty for an unknown text.
+/// The unit as a word of metres_per(); empty for an unknown text.
 std::string_view unit_word(std::string_view text) {
   const std::string unit = in_lower_case(text);
   if (unit == "mm" || unit == "millimeters" || unit == "millimetres") return "mm";
@@ -69,7 +69,8 @@ PointColumn column_named(std::string_view text) {
   return PointColumn::Other;
 }
 
-/// The columns of a heading; empty if the fields are none: X, Y and Z, each once.
+/// The columns of a heading. Empty if the fields are not a heading, which contains X, Y and Z, each
+/// once.
 std::vector<PointColumn> columns_of_heading(const std::vector<std::string_view>& fields) {
   std::vector<PointColumn> columns;
   for (const auto field : fields) columns.push_back(column_named(field));
@@ -78,7 +79,7 @@ std::vector<PointColumn> columns_of_heading(const std::vector<std::string_view>&
   return columns;
 }
 
-/// Joins a date and the time of day behind it, which blanks separate, to one field.
+/// Joins a date and the following time of day, which are separated by blanks, into one field.
 void join_stamps(std::vector<std::string_view>& fields) {
   for (std::size_t i = 0; i + 1 < fields.size(); ++i) {
     const char* const begin = fields[i].data();
@@ -90,13 +91,14 @@ void join_stamps(std::vector<std::string_view>& fields) {
   }
 }
 
-/// The columns of a row without heading; empty if they are not clear. `fields` without a time.
+/// The columns of a row without a heading; empty if they are ambiguous. `fields` does not contain
+/// the time.
 std::vector<PointColumn> columns_of_row(const std::vector<std::string_view>& fields) {
   using enum PointColumn;
   constexpr std::size_t kFewest = 3, kMost = 6;
   const std::array<PointColumn, kMost> all{Collection, Group, Name, X, Y, Z};
   if (fields.size() < kFewest || fields.size() > kMost) return {};
-  // Of more than four numbers it is not clear which are the coordinates.
+  // With more than four numbers it is not clear which of them are the coordinates.
   const std::size_t names = fields.size() - kFewest;
   for (std::size_t i = 0; i + 1 < names; ++i)
     if (is_number_field(fields[i])) return {};
@@ -241,7 +243,7 @@ class PointRows {
   std::map<std::string, std::size_t> line_of_;
 };
 
-/// The unit that a comment or a heading states in brackets; empty without.
+/// The unit in the brackets of a comment or heading; empty if there is none.
 std::string_view unit_in(std::string_view line) {
   const auto content = is_comment_line(line) ? content_of_comment(line) : line;
   if (content.starts_with("AXES")) return in_brackets(content);
@@ -275,7 +277,7 @@ bool is_point_export(std::string_view text) {
     const auto fields = fields_of(line, separator_of_points(line));
     if (!columns_of_heading(fields).empty()) return true;
     if (fields.size() < 4 || is_number_field(fields[0])) return false;
-    std::size_t numbers = 0;  // at least three in a row
+    std::size_t numbers = 0;  // there must be at least three numbers in a row
     for (const auto field : fields) {
       numbers = is_number_field(field) ? numbers + 1 : 0;
       if (numbers == 3) return true;

@@ -1,4 +1,4 @@
-// Exported points as those of tracker.csv and verification.csv.
+// Converts exported points to the form of tracker.csv and verification.csv.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,7 +27,8 @@ void check_export_times(const std::vector<ExportedPoint>& points, Faults& faults
   }
 }
 
-/// Points that are missing in a list without times shift all times after them.
+/// Adds a fault if points seem to be missing: in a list without times, a missing point shifts all
+/// times after it.
 void check_no_point_missing(const std::vector<ExportedPoint>& points, Faults& faults) {
   constexpr double kLeast_m = 0.2e-3, kFactor = 3.0;
   const auto step_m = [&](std::size_t i) { return (points[i + 1].p_m - points[i].p_m).norm(); };
@@ -55,7 +56,7 @@ calib::Vector3 reading_in(const NumberTable& table, std::size_t row, std::size_t
           table.at(row, first + 2) / kMmPerM};
 }
 
-/// The readings by name: sets those of the points of a name. Returns the line of each name.
+/// Sets the reading of each point by its name. Returns the line of each name.
 void take_named(ParsedTable& readings, const std::vector<std::string_view>& words,
                 const LinesOfNames& names, const PointExport& exported, VerificationFile& out) {
   auto& [source, table, faults] = readings;
@@ -137,7 +138,7 @@ Result<VerificationFile> verification_of_export(const PointExport& points,
     out.lines.push_back(point.line);
   }
 
-  constexpr std::size_t kNamed = 1;  // index of this variant of the file
+  constexpr std::size_t kNamed = 1;  // index of the variant of the file with names
   const bool named = readings->table.form() == kNamed;
   if (named && words.empty())
     readings->faults.add(1, 1, "name",

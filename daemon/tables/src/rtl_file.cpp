@@ -20,12 +20,12 @@ constexpr std::array<std::string_view, 4> kRtlSections{"HEADER", "TARGET DATA", 
 
 /// One row of "Run Target Data:".
 struct Deviation {
-  std::size_t target = 0;  ///< index
-  double value = 0.0;      ///< as in the file
+  std::size_t target = 0;  ///< index of the target
+  double value = 0.0;      ///< value as in the file
   std::size_t line = 0;
 };
 
-/// "Target-count: 11": the words on both sides of the colon.
+/// An entry such as "Target-count: 11": the texts before and after the colon.
 struct RtlEntry {
   std::string_view key, value;
 };
@@ -100,7 +100,7 @@ class RtlRows {
                               protocol::printable_line(entry->value)));
   }
 
-  /// The count of an entry; a fault unless it is a whole number of at least 1.
+  /// The count in an entry. Adds a fault unless it is a whole number of at least 1.
   std::optional<std::size_t> count_of(const RtlEntry& entry) {
     double count = 0.0;
     std::string fault = number_fault(entry.value, count);
@@ -173,7 +173,7 @@ class RtlRows {
   TextLines lines_;
   Faults& faults_;
   std::string section_;
-  std::map<std::string, std::size_t> seen_;  // line of each section
+  std::map<std::string, std::size_t> seen_;  // line number of each section
   bool in_values_ = false, type_seen_ = false;
   std::optional<std::size_t> target_count_, run_count_;
   std::size_t target_count_line_ = 0, run_count_line_ = 0;
@@ -198,7 +198,7 @@ void check_targets_of_run(int run, const std::vector<Deviation>& rows, std::size
                                 run, line_of.size(), targets));
 }
 
-/// Whether the run is towards larger positions; nullopt after a fault.
+/// True if the run moves towards larger positions; nullopt after a fault.
 std::optional<bool> direction_of(int run, const std::vector<Deviation>& rows,
                                  const std::vector<double>& targets_mm, Faults& faults) {
   std::optional<bool> forward;
@@ -223,7 +223,7 @@ MeasuredFile measured_by(const RtlRows& rows, const RtlOptions& options, Faults&
   calib::direct::MeasuredError error{.name = options.error, .readings = {}};
   error.line_m = options.line_m;
   std::vector<std::size_t> lines;
-  std::array<int, 2> runs_towards{};  // smaller, larger positions
+  std::array<int, 2> runs_towards{};  // number of runs towards smaller and towards larger positions
 
   for (const auto& [run, deviations] : rows.runs()) {
     check_targets_of_run(run, deviations, rows.targets_mm().size(), faults);

@@ -9,7 +9,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// A whole number of digits only.
+/// The number in a text of at most `most` digits and no other characters.
 std::optional<unsigned> digits(std::string_view text, std::size_t most) {
   if (text.empty() || text.size() > most) return std::nullopt;
   unsigned value = 0;
@@ -42,7 +42,7 @@ std::optional<double> seconds_of_day(std::string_view text) {
   const bool starts_with_digit = !parts[2].empty() && parts[2][0] >= '0' && parts[2][0] <= '9';
   if (!h || !m || !starts_with_digit || !protocol::parse_decimal(parts[2], s).empty())
     return std::nullopt;
-  if (*h > 23 || *m > 59 || s >= 61.0) return std::nullopt;  // 60: a leap second
+  if (*h > 23 || *m > 59 || s >= 61.0) return std::nullopt;  // a second of 60 is a leap second
   return 3600.0 * *h + 60.0 * *m + s;
 }
 

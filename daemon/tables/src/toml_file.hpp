@@ -1,5 +1,5 @@
 #pragma once
-/// What the readers of TOML files have in common.
+/// Functions that the readers of TOML files share.
 
 #include <toml++/toml.h>
 #include <filesystem>

@@ -1,6 +1,6 @@
 #pragma once
-/// Checks that the arguments of several tasks have in common. The command line makes them again, so
-/// that its help names what is possible.
+/// Checks of arguments that several tasks share. The command line makes the same checks, so that
+/// its help lists the allowed values.
 
 #include <initializer_list>
 #include <string_view>
@@ -17,10 +17,10 @@ struct GivenArgument {
   std::string_view name;
   bool given = false;
 };
-/// Usage if one of the arguments is given: it has no effect beside `beside`.
+/// Usage if one of the arguments is given, because it has no effect together with `beside`.
 [[nodiscard]] Result<void> require_none(std::string_view beside,
                                         std::initializer_list<GivenArgument> arguments);
-/// Usage if one of the arguments is missing, which `task` needs.
+/// Usage if one of the arguments is missing; `task` needs all of them.
 [[nodiscard]] Result<void> require_all(std::string_view task,
                                        std::initializer_list<GivenArgument> arguments);
 

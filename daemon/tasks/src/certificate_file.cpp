@@ -8,7 +8,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// A date, "2026-11-26".
+/// Reads a date, "2026-11-26".
 void read_date(Section& section, std::string_view key, std::string& out) {
   if (section.get(key, out) && !is_date(out))
     section.fault(key, "must be a date such as \"2026-11-26\"");

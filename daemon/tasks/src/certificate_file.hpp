@@ -8,7 +8,7 @@
 
 namespace abbe::daemon {
 
-/// Every entry is optional. BadInput with all faults.
+/// Reads the file; every entry is optional. BadInput with all faults.
 [[nodiscard]] Result<CertificateDetails> read_certificate_toml(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

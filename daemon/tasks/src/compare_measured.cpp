@@ -23,7 +23,7 @@ direct::CompareOptions compare_options(const MeasuredOptions& options) {
                      .u_scale = options.u_ppm / kUmPerM}};
 }
 
-/// One line for each value that alone does not fit the others of its error.
+/// One line for each single value that does not fit the other values of its error.
 std::vector<std::string> lines_of_rows_off(const std::string& name, const MeasuredFile& file) {
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < file.errors.size(); ++i) {

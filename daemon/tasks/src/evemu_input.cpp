@@ -28,7 +28,8 @@ namespace {
 
 namespace evemu = calib::evemu;
 
-/// From the option, else the fixed temperature of [evemu]; the values of a sensor are in no file.
+/// The temperature of the array: from the option, else the fixed temperature of [evemu]. Values of
+/// a sensor are not in the files.
 std::optional<evemu::ArtefactTemperature> artefact_temperature(const EvemuInputArguments& arguments,
                                                                const EvemuConfig& config) {
   if (arguments.artefact_C)

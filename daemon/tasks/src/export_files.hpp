@@ -1,5 +1,6 @@
 #pragma once
-/// Files of an export get their names only after they are read back and proven.
+/// Writes the files of an export. The files get their names only after they were read back and
+/// proven.
 
 #include <filesystem>
 #include <functional>
@@ -10,11 +11,11 @@
 
 namespace abbe::daemon {
 
-/// Io unless the files can be placed at `out`: a file in an existing folder, or a folder, which may
-/// be missing. A device or pipe is never replaced.
+/// Io unless the files can be written to `out`, which is a file in an existing folder, or a folder
+/// that may be missing. A device or pipe is never replaced.
 [[nodiscard]] Result<void> require_place(const FormatFacts&, const std::filesystem::path& out);
 
-/// `out` itself, or the files in the folder `out`.
+/// The paths of the files: `out` itself, or the files in the folder `out`.
 [[nodiscard]] std::vector<std::filesystem::path> final_paths(const FormatFacts&,
                                                              const std::filesystem::path& out,
                                                              std::span<const ExportFile>);

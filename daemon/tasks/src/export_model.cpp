@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A request whose options are checked.
+/// A request with checked options.
 struct ExportRequest {
   const FormatFacts* facts = nullptr;
   ModelDocument document;
@@ -74,7 +74,8 @@ Result<void> add_nodes(ExportRequest& request, const ExportArguments& arguments)
   return {};
 }
 
-/// The options that need no model come first: a wrong one is reported at once.
+/// Checks the options. Options that need no model are checked first, so that a wrong one is
+/// reported at once.
 Result<ExportRequest> request_of(const ExportArguments& arguments,
                                  const ShowCautions& show_cautions) {
   const auto facts = format_of(arguments.to);
@@ -138,7 +139,7 @@ calib::CorrectionFunction correction_function(const HeldCorrection& held) {
   };
 }
 
-/// DataInsufficient if the machine would not become better.
+/// DataInsufficient if the correction would not improve the machine.
 Result<void> require_use(const ExportRequest& request, const calib::ExportLoss& loss) {
   constexpr double kNothing_m = 1e-9, kUseful = 0.99;
   const double without_m = loss.rms_without_m.norm(), lost_m = loss.rms_lost_m.norm();
@@ -186,7 +187,7 @@ Result<ExportReport> computed_report(const ExportRequest& request,
   return report;
 }
 
-/// The report beside the files of a format that has a folder.
+/// The path of the report, which is in the same folder as the files, for a format with a folder.
 fs::path report_path(const fs::path& folder) {
   return folder / "export.txt";
 }

@@ -54,7 +54,7 @@ Result<ReportSubject> kept(const ResultPlace& place, const ModelDocument& docume
   return report_subject(*store, *id);
 }
 
-/// report.html; returns it.
+/// Writes report.html and returns its text.
 Result<std::string> write_page(const std::filesystem::path& folder, const ReportSubject& subject) {
   auto page = model_report(subject);
   ABBE_TRY(page);
@@ -62,7 +62,7 @@ Result<std::string> write_page(const std::filesystem::path& folder, const Report
   return page;
 }
 
-/// A model that is in no store.
+/// A model that is not in a store.
 ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdict) {
   ReportSubject subject{.document = document};
   subject.entry = StoreEntry{
@@ -83,7 +83,8 @@ Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& ident
   ABBE_TRY(replace_file(folder / "model.json", to_json(document)));
   for (const auto& [name, text] : more) ABBE_TRY(replace_file(folder / name, text));
 
-  // Before the store: a model that cannot be reported is not kept, and the error says so.
+  // This is done before the model is stored: if no report can be made of the model, it is not
+  // stored.
   auto page = write_page(folder, judged(document, verdict));
   ABBE_TRY(page);
   if (!place.keep.empty()) {

@@ -16,8 +16,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// BadInput if the balls have a size that no ball of an artefact has, but would have it with the
-/// touches in another unit.
+/// BadInput if the balls have a size that no ball of an artefact has, but would have a usual size
+/// if the touches were in another unit.
 Result<void> check_size_of_balls(const std::string& file, const calib::evemu::Calibrator& found) {
   constexpr double kSmallest_m = 1e-3, kLargest_m = 0.1;
   const auto all_usual = [&](double factor) {

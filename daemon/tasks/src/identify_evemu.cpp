@@ -20,8 +20,8 @@ namespace {
 
 namespace evemu = calib::evemu;
 
-/// `given` is a keyword, or a file with one fold number for each of the 3 rows of every ball, in
-/// the order of position and ball.
+/// The options for the division into folds. `given` is a keyword, or a file with one fold number
+/// for each of the 3 rows of every ball, in the order of position and ball.
 Result<evemu::SparseOptions> sparse_options(const std::string& given,
                                             std::vector<InputFile>& sources) {
   evemu::SparseOptions options;

@@ -45,7 +45,7 @@ ModelDocument joint_document(const JointInput& input, const joint::JointModel& m
           input.sources};
 }
 
-/// The model of all parts with its verdict; `identified` has no contradiction.
+/// The model of all parts with its verdict. Requires that `identified` has no contradiction.
 Result<JointOutcome> judged(const IdentifyJointArguments& arguments, JointInput input,
                             joint::JointIdentification identified, const Progress& progress) {
   const auto active = active_model(arguments.keep);

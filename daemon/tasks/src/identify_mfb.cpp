@@ -32,13 +32,14 @@ struct MfbInput {
   Config config;
   MfbTask task;
   std::vector<InputFile> sources;
-  std::vector<std::vector<std::size_t>> lines{};  ///< of the touches in their file; else empty
+  /// lines of the touches in their file; empty for a recording
+  std::vector<std::vector<std::size_t>> lines{};
   std::vector<std::string> against_pass{};
-  ObservedTimes observed{};   ///< of the recording; nullopt for files
-  protocol::UtcOffset utc{};  ///< of the host clock of the recording
+  ObservedTimes observed{};   ///< times of the recording; nullopt for files
+  protocol::UtcOffset utc{};  ///< offset of the host clock of the recording
 };
 
-/// The machine as it was configured, for the readings of the file `points`.
+/// Reads the configuration of the machine, for the readings in the file `points`.
 Result<Config> read_config(const IdentifyMfbArguments& arguments) {
   auto config = load_config(arguments.machine);
   if (!config) return config;
@@ -54,8 +55,8 @@ mfb::Options options_of(const IdentifyMfbArguments& arguments) {
   return options;
 }
 
-/// Bar, plan and touches of a session; nothing is against its pass, because the guide of the
-/// session takes no such touch.
+/// Bar, plan and touches of a recorded session. No rows run against their pass, because the guide
+/// of the session does not take such touches.
 Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments,
                                     const Progress& progress) {
   auto recording = open_recording(arguments.recording, arguments.machine);
@@ -111,7 +112,7 @@ Result<MfbInput> read_input(const IdentifyMfbArguments& arguments, const Progres
   return input;
 }
 
-/// One line for each touch that alone is not where the other touches of its measurement place it.
+/// One line for each single touch that does not fit the other touches of its measurement.
 std::vector<std::string> lines_of_touches_off(const std::string& file, const MfbInput& input) {
   const auto& task = input.task;
   std::vector<std::string> lines;
@@ -128,8 +129,9 @@ std::vector<std::string> lines_of_touches_off(const std::string& file, const Mfb
   return lines;
 }
 
-/// Errors of an identification name measurement and feature. The file of the touches is put before,
-/// what may be the cause behind: touches that alone do not fit, rows against their pass.
+/// Completes an error of the identification, which names measurement and feature: adds the name of
+/// the file of touches at the front, and the possible causes at the end (single touches that do not
+/// fit, rows against their pass).
 Error in_points(const IdentifyMfbArguments& arguments, const MfbInput& input, Error error) {
   const std::string& file = arguments.recording.empty() ? arguments.points : arguments.recording;
   error.text = fmt::format("{}: {}", file, error.text);

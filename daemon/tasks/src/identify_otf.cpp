@@ -112,8 +112,8 @@ struct Files : MachineAndPath {
   std::optional<EncoderFile> encoder = {};
 };
 
-/// BadInput for a file with about one row per position in standstill mode: its rows are means,
-/// which are not read in any frame.
+/// BadInput in standstill mode for a file with about one row per position. Its rows are mean
+/// values, which abbe does not read.
 Result<void> check_no_means(const IdentifyOtfArguments& arguments, const TrackerFile& tracker,
                             const MachineAndPath& read) {
   constexpr std::size_t kLeastPerPosition = 2;
@@ -226,7 +226,8 @@ Result<void> check_words(const IdentifyOtfArguments& arguments) {
   return require_word("--backlash", arguments.backlash, {"none", "per-table", "forward-backward"});
 }
 
-/// A recording, or path and tracker, or path and several targets.
+/// Usage unless exactly one source is given: a recording, or path and tracker, or path and several
+/// targets.
 Result<void> check_sources(const IdentifyOtfArguments& arguments) {
   const bool has_files = !arguments.tracker.empty() || !arguments.targets.empty();
   if (!has_files && arguments.recording.empty())

@@ -1,4 +1,4 @@
-// What the options of `abbe identify otf` change in the configuration, and the checks of the path.
+// Applies the options of `abbe identify otf` to the configuration, and checks the path.
 #include <fmt/format.h>
 
 #include "abbe/base/units.hpp"

@@ -1,4 +1,4 @@
-// `abbe identify otf --recording ...`: a run that the daemon recorded.
+// Identifies a run that the daemon recorded: `abbe identify otf --recording ...`.
 #include <fmt/format.h>
 
 #include <utility>
@@ -22,7 +22,7 @@ struct RecordedCandidate {
   ObservedTimes observed;
 };
 
-/// The last run of the recording in which the whole path was driven.
+/// The last run of the recording in which the machine travelled the whole path.
 Result<RecordedCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
   std::string why = replayed.calibrations.empty() ? "no calibration was requested" : "";
   for (auto c = replayed.calibrations.rbegin(); c != replayed.calibrations.rend(); ++c) {

@@ -1,4 +1,4 @@
-// `abbe identify otf --target-mm ...`: several runs, each with another target offset.
+// Identifies several runs, each with another target offset: `abbe identify otf --target-mm ...`.
 #include <fmt/format.h>
 
 #include <array>
@@ -38,7 +38,8 @@ Error not_a_target(const std::string& text) {
                       text)};
 }
 
-/// "20,-15,-120=tracker1.csv": the offset, and the name of the file behind '='.
+/// Splits a text such as "20,-15,-120=tracker1.csv" into the offset and the name of the file after
+/// '='.
 Result<std::pair<calib::Vector3, std::string>> parse_target(const std::string& text) {
   const char* at = text.data();
   const char* const end = at + text.size();
@@ -84,7 +85,7 @@ Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, const Progre
 
 Result<void> check_runs(const IdentifyOtfArguments& arguments, TargetRuns& all) {
   ABBE_TRY(check_scales("identify otf", "a path", all.config, arguments.scales_corrected));
-  all.config.machine.target_given = true;  // by --target-mm
+  all.config.machine.target_given = true;  // the offsets are given by --target-mm
   return check_path(arguments.path, all.path, all.config);
 }
 
@@ -97,7 +98,7 @@ std::vector<RunResiduals> residuals_of(const calib::otf::TargetsIdentification& 
   return runs;
 }
 
-/// One solution with the statistics of all runs.
+/// The common solution, with the statistics of all runs.
 calib::otf::Solution of_all_runs(calib::otf::TargetsIdentification found) {
   calib::otf::Solution all = std::move(found.solutions.front());
   all.statistics = found.statistics;

@@ -60,8 +60,8 @@ void set_aside(std::vector<mfb::PassTouches>& passes,
       touch.set_aside = touch.set_aside || touch.target == wrong.target;
 }
 
-/// The verdict of `identify mfb` on the bar alone; the touches that it finds wrong are excluded. A
-/// bar that determines no model by itself has no reasons, and a note.
+/// The verdict on the bar alone, as in `identify mfb`; touches that it finds wrong are excluded. If
+/// the bar alone does not determine a model, the verdict has a note instead of reasons.
 calib::Verdict verdict_of_bar(MfbTask& task, const Config& config) {
   const auto found = identify_with_bar(task, config, nullptr);
   if (!found) return {.notes = {"not judged by itself: " + found.error().text}};

@@ -59,7 +59,7 @@ IdentifyOtfArguments arguments_of(const IdentifyJointArguments& all, const RunFi
   return run;
 }
 
-/// The offset of the ranges that the run shares with others.
+/// The offset of the ranges that the run shares with other runs.
 Result<std::optional<calib::TrackerPlace>> shared_offset(const RunFiles& files,
                                                          const calib::otf::Solution& solution) {
   if (files.range_offset.empty()) return std::nullopt;
@@ -72,7 +72,7 @@ Result<std::optional<calib::TrackerPlace>> shared_offset(const RunFiles& files,
   return calib::TrackerPlace{files.range_offset, *solution.offset_in_model};
 }
 
-/// Notes every run with a range_offset that no other run has.
+/// Adds a note for every run whose range_offset no other run has.
 void note_unshared_offsets(const std::vector<RunFiles>& runs, std::vector<PartFacts>& facts) {
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const std::string& name = runs[k].range_offset;
@@ -86,7 +86,8 @@ void note_unshared_offsets(const std::vector<RunFiles>& runs, std::vector<PartFa
 
 constexpr std::string_view kSimulated = "daemon.simulated";
 
-/// What take_recorded_readings() takes of a part, except whether its devices are simulated.
+/// The entries that take_recorded_readings() takes from a part, except whether its devices are
+/// simulated.
 MeaningEntries recorded_readings(const Config& part) {
   MeaningEntries taken;
   take_entries(taken, part.meaning.readings, {"machine", "axes", "target", "model", "thermal"});
@@ -94,7 +95,8 @@ MeaningEntries recorded_readings(const Config& part) {
   return taken;
 }
 
-/// One model cannot correct readings of two meanings.
+/// Refused if the readings of the part have another meaning than those of the parts before: one
+/// model cannot correct both.
 Result<void> require_same_readings(const std::string& name, const Config& part, JointInput& input) {
   auto readings = recorded_readings(part);
   if (!input.recorded_readings) input.recorded_readings = readings;
@@ -108,8 +110,8 @@ Result<void> require_same_readings(const std::string& name, const Config& part, 
                           name, listed(changes)));
 }
 
-/// A recorded part gives the readings their meaning. One part of simulated devices makes the whole
-/// model one of simulated devices.
+/// Takes the meaning of the readings from a recorded part. If the devices of one part are
+/// simulated, the whole model counts as a model of simulated devices.
 void take_readings_of(const Config& part, Config& config) {
   const auto* earlier = value_of(config.meaning.readings, kSimulated);
   const std::string devices = earlier != nullptr ? *earlier : "false";
@@ -143,7 +145,7 @@ Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& fi
   auto part = calib::joint::part_of_run(files.name, solution.model, *input.common, effects);
   if (!part) return tl::make_unexpected(error_of(part.error()));
 
-  // Of its variance, less than three quarters are determined by the data.
+  // In this case, the data determine less than three quarters of the variance of the offset.
   constexpr double kHalf = 0.5;
   if (!*offset && solution.range_offset.u_m > kHalf * run->noise.u_range_offset_m)
     run->verdict.notes.emplace_back(
@@ -177,8 +179,8 @@ EvemuInputArguments arguments_of(const IdentifyJointArguments& all, const ArrayF
   return array;
 }
 
-/// The verdict of the ball array's own method. An array that determines no model by itself has no
-/// reasons, and a note.
+/// The verdict on the ball array alone. If the array alone does not determine a model, the verdict
+/// has a note instead of reasons.
 calib::Verdict verdict_of_array(const EvemuInput& array) {
   const auto candidate = identify_with_array(
       {array.observations, {.limits = gate_limits(array.config.gate), .accept_shape_only = true}},
@@ -193,7 +195,7 @@ Result<void> add_array(const IdentifyJointArguments& arguments, const ArrayFiles
   auto array = read_evemu_input(arguments_of(arguments, files), progress);
   if (!array) return tl::make_unexpected(in_part(files.name, array.error()));
 
-  // Parts measured with one array have the same errors of its calibration.
+  // Parts that were measured with the same array have the same errors of its calibration.
   calib::joint::ArrayOptions options{.s_m = files.s_centre_m,
                                      .linearised_at = input.facts.front().own_model->U()};
   if (!files.calibrator.empty()) options.array = file_names({files.calibrator});

@@ -46,7 +46,7 @@ nlohmann::json parts_json(const JointOutcome& outcome) {
   return parts;
 }
 
-/// Standard uncertainty of each table: of the model of every run, and of the joint model.
+/// Standard uncertainty of each table, in the model of every run and in the joint model.
 struct TableRow {
   TableUncertainty joint;
   std::vector<double> u_of_runs;

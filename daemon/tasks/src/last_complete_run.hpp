@@ -1,5 +1,5 @@
 #pragma once
-/// The last complete run of one method in a recording of the daemon.
+/// Finds the last complete run of one method in a recording of the daemon.
 
 #include <fmt/format.h>
 
@@ -17,8 +17,8 @@
 
 namespace abbe::daemon {
 
-/// The last run of `Method` that was acquired whole. DataInsufficient without one: "FILE: contains
-/// no complete `what`: ", with the reason.
+/// The last complete run of `Method`. DataInsufficient if there is none: "FILE: contains no
+/// complete `what`: ", with the reason.
 template <class Method>
 [[nodiscard]] Result<typename Method::Run> last_complete_run(const OpenedRecording& recording,
                                                              std::string_view file,

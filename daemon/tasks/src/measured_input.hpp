@@ -1,11 +1,13 @@
 #pragma once
-/// --measured: measured.csv, or an .rtl file with what it does not state.
+/// Reads the file of the option --measured: measured.csv, or an .rtl file together with the options
+/// that it needs.
 
 #include "abbe/tasks/compare_measured.hpp"
 
 namespace abbe::daemon {
 
-/// BadInput with what is missing for an .rtl file, or for options that measured.csv does not need.
+/// Reads the file. BadInput names missing options for an .rtl file, or options that measured.csv
+/// does not need.
 [[nodiscard]] Result<MeasuredFile> read_measured(const MeasuredOptions& options);
 
 }  // namespace abbe::daemon

@@ -14,7 +14,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// A recording that is being written ends in ".part", which it loses when it is closed.
+/// The present name of a recording. While a recording is written its name ends in ".part", which is
+/// removed when the recording is closed.
 std::string present_name(const std::string& file) {
   constexpr std::string_view kOpen = ".part";
   std::error_code unknown;
@@ -41,7 +42,7 @@ Result<OpenedRecording> open_recording(const std::string& named, const std::stri
 
 namespace {
 
-/// [[thermal]] of `config`, with the temperatures that `recorded` has by the same name.
+/// The [[thermal]] tables of `config`, with the recorded temperatures of the same names.
 std::vector<ThermalConfig> thermal_of_recorded(const Config& config, const Config& recorded) {
   std::vector<ThermalConfig> all;
   for (ThermalConfig thermal : config.thermal) {
@@ -54,7 +55,8 @@ std::vector<ThermalConfig> thermal_of_recorded(const Config& config, const Confi
   return all;
 }
 
-/// Which recorded sensors correct a reading follows from [[thermal]], which stays that of `config`.
+/// Sets the sensors that correct a reading to the recorded ones. [[thermal]], which stays that of
+/// `config`, determines which sensors these are.
 void take_recorded_sensors(Config& config, const Config& recorded) {
   Config sensors = recorded;
   sensors.thermal = thermal_of_recorded(config, recorded);

@@ -43,7 +43,7 @@ Result<TrackerFile> read_exported_tracker(const IdentifyOtfArguments& arguments,
   return tracker_of_export(*points, file, arguments.tracker_points_per_s);
 }
 
-/// "X=m1.RBV" for each of the three axes.
+/// The names of the PVs of the three axes, from texts such as "X=m1.RBV".
 Result<std::array<std::string, 3>> parse_pvs(const std::vector<std::string>& texts) {
   std::array<std::string, 3> pvs;
   for (const std::string& text : texts) {

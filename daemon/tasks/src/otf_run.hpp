@@ -1,5 +1,5 @@
 #pragma once
-/// What the identification of one run, of a recording and of several targets have in common.
+/// Functions for the identification of one run, of a recording and of several targets.
 
 #include <optional>
 #include <string>
@@ -15,31 +15,32 @@ namespace abbe::daemon {
 struct MachineAndPath {
   Config config;
   PathFile path;
-  std::vector<InputFile> sources;  ///< of both
+  std::vector<InputFile> sources;  ///< both files
 };
 /// Reads --machine and --path.
 [[nodiscard]] Result<MachineAndPath> read_machine_and_path(const IdentifyOtfArguments& arguments);
 
-/// --u-scale-ppm, or that of the configured tracker; 0 without both.
+/// The value of --u-scale-ppm, or that of the configured tracker; 0 if neither is given.
 [[nodiscard]] double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config);
 
 /// Sets the prior for smooth tables as --smoothness-um (`text`) states: none, UM or
 /// UM_X,UM_Y,UM_Z. Error Usage for another text.
 [[nodiscard]] Result<void> apply_smoothness(const std::string& text, Config& config);
-/// The options of the command replace those of the configuration; --smoothness-um apart.
+/// Replaces settings of the configuration by the options of the command, except --smoothness-um.
 void apply(const IdentifyOtfArguments& arguments, Config& config);
 
-/// Refuses the model of a run whose points state a place of the tracker that their noise
-/// contradicts, unless the gate accepts it.
+/// Refuses the model of a run unless the gate accepts it otherwise: the noise of the points
+/// contradicts the stated place of the tracker.
 void judge_beams(const TrackerFile& points, const calib::otf::Observations& observations,
                  const calib::otf::Solution& solution, const GateConfig& gate,
                  calib::Verdict& verdict);
-/// What the frame of the points leaves of the options: the vertical of the tracker is unknown in
-/// another frame. Error for reference nests, whose positions are in the frame of the tracker.
+/// Adapts the options to the frame of the points: if it is not the frame of the tracker, the
+/// vertical of the tracker is unknown. Error if there are reference nests, because their positions
+/// are in the frame of the tracker.
 [[nodiscard]] Result<void> apply_frame(const TrackerFile& points, const std::string& file,
                                        calib::otf::Options& options);
 
-/// Makes the checks of the path that the daemon makes before the machine drives. The message for a
+/// Makes the checks of the path that the daemon makes before the machine moves. The message for a
 /// vertex outside the travel gives line and column.
 [[nodiscard]] Result<void> check_path(const std::string& file, const PathFile& path,
                                       const Config& config);

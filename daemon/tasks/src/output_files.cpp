@@ -9,11 +9,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Also of files that do not exist yet, and through links.
+/// True if both paths mean the same file, also through links, and also if the files do not exist
+/// yet.
 bool are_the_same(const fs::path& a, const fs::path& b) {
   std::error_code fault;
   if (fs::equivalent(a, b, fault)) return true;
-  const auto whole = fs::weakly_canonical(fs::absolute(a), fault);  // empty: it cannot be known
+  // empty: the path cannot be determined
+  const auto whole = fs::weakly_canonical(fs::absolute(a), fault);
   return !whole.empty() && whole == fs::weakly_canonical(fs::absolute(b), fault);
 }
 

@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder that exists as long as the object.
+/// A temporary folder that exists as long as the object.
 class WorkFolder {
  public:
   WorkFolder() {
@@ -48,7 +48,7 @@ class WorkFolder {
   fs::path path_;
 };
 
-/// The program in a folder of PATH; nullopt if there is none.
+/// The path of the program in the folders of PATH; nullopt if there is none.
 std::optional<std::string> program_named(std::string_view name) {
   const char* const path = std::getenv("PATH");
   std::istringstream folders(path == nullptr ? "/usr/bin:/bin" : path);
@@ -74,7 +74,8 @@ std::vector<std::string> converter(const fs::path& html, const fs::path& pdf,
                                    "--user-data-dir=" + profile.string(),
                                    "--print-to-pdf=" + pdf.string(),
                                    "file://" + html.string()};
-    // Chromium has no sandbox for root. The page is made by abbe and contains no script.
+    // For root, Chromium cannot use its sandbox. This is safe, because abbe made the page and it
+    // contains no script.
     if (::geteuid() == 0) words.insert(words.begin() + 1, "--no-sandbox");
     return words;
   }
@@ -87,7 +88,7 @@ Result<void> no_converter() {
               "report from a browser");
 }
 
-/// Starts the program without output. nullopt if it cannot be started.
+/// Starts the program; its output is discarded. nullopt if it cannot be started.
 std::optional<pid_t> start_converter(const std::vector<std::string>& words) {
   std::vector<std::string> copy = words;
   std::vector<char*> arguments;
@@ -99,7 +100,7 @@ std::optional<pid_t> start_converter(const std::vector<std::string>& words) {
   ::posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   ::posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  // A group of its own, so that its children can be ended together with it.
+  // The program gets its own process group, so that its children can be ended together with it.
   posix_spawnattr_t attributes{};
   ::posix_spawnattr_init(&attributes);
   ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -111,7 +112,8 @@ std::optional<pid_t> start_converter(const std::vector<std::string>& words) {
   return failed == 0 ? std::optional(child) : std::nullopt;
 }
 
-/// True if the process ends with exit code 0 in time; else it is killed with its children.
+/// True if the process ends with exit code 0 in time. If it takes too long, it is killed together
+/// with its children.
 bool succeeds(pid_t child, const Progress& progress) {
   constexpr std::chrono::milliseconds kPoll{50};
   constexpr std::chrono::seconds kMost{180};

@@ -21,7 +21,7 @@ namespace {
 
 namespace mfb = calib::mfb;
 
-/// "x,y,z" or "x,y,z,-x": the stem along an axis.
+/// Reads a stylus, "x,y,z" or "x,y,z,-x": the last part is the axis along which the stem points.
 Result<mfb::Stylus> parse_stylus(const std::string& text, const calib::KinematicChain& chain) {
   const auto malformed = [&] {
     return fail(
@@ -86,7 +86,7 @@ Result<std::optional<mfb::RotaryTable>> table_of(const PlanMfbArguments& argumen
   return std::optional{table};
 }
 
-/// Positions of one clamping follow each other.
+/// Sorts the positions so that the positions of one clamping follow each other.
 void order_by_clamping(std::vector<mfb::PlannedPosition>& positions,
                        std::vector<mfb::IndexedPosition>& indexed) {
   std::vector<std::size_t> order(positions.size());
@@ -102,7 +102,7 @@ void order_by_clamping(std::vector<mfb::PlannedPosition>& positions,
   }
 }
 
-/// Adds what follows from the measurements of the plan.
+/// Adds the prediction that follows from the measurements of the plan.
 Result<BarPlan> predicted(BarPlan plan, const PlanMfbArguments& arguments,
                           const PlanInputs& inputs) {
   const auto prediction = mfb::predict(inputs.bar, plan.plan, inputs.machine);

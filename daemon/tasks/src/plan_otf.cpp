@@ -20,7 +20,7 @@ namespace otf = calib::otf;
 
 namespace {
 
-/// The configuration file that the options stand for, without tracker and devices.
+/// The configuration that corresponds to the options, without tracker and devices.
 Result<Config> machine_of_options(const PlanOtfArguments& arguments) {
   const auto tool_m = parse_mm("--tool-mm", arguments.tool);
   ABBE_TRY(tool_m);
@@ -78,7 +78,7 @@ otf::PathBudget budget_of(const PlanOtfArguments& arguments, const otf::Machine&
   return budget;
 }
 
-/// Compares the tracker positions by quick walks, and sets the best one in `run`.
+/// Compares the tracker positions with quickly computed paths, and sets the best position in `run`.
 Result<std::vector<std::pair<calib::Vector3, double>>> compare_trackers(
     otf::PlannedRun& run, const std::vector<calib::Vector3>& trackers,
     const otf::PathBudget& budget, const otf::Stopped& stopped) {
@@ -104,7 +104,7 @@ Result<otf::Path> path_of_file(const std::string& file) {
 }  // namespace
 
 Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& progress) {
-  constexpr std::size_t kTravelNumbers = 6;  // low and high of X, Y, Z
+  constexpr std::size_t kTravelNumbers = 6;  // lower and upper end of X, Y and Z
   if (arguments.machine.empty() && arguments.travel_mm.size() != kTravelNumbers)
     return fail(ErrorCode::Usage, "plan otf needs --machine or --travel-mm");
   const auto config =
@@ -134,7 +134,7 @@ Result<PathPlan> plan_otf(const PlanOtfArguments& arguments, const Progress& pro
         plan.run, budget,
         {.lattice = arguments.lattice,
          .exchanges = arguments.exchanges,
-         .stopped = stopped,  // before there is a path
+         .stopped = stopped,  // used until there is a path
          .enough = stopped,
          .progress = [&progress](double share, double rms_u_m) {
            progress.show(fmt::format("{:.4f} um (Ctrl-C: use it)", rms_u_m * kUmPerM), share);

@@ -143,7 +143,7 @@ void add_left(HtmlReport& page, const Verification& v) {
                        {"with the model", lengths_um(c.residual_after_m)}}});
 }
 
-/// "line 9", "lines 9, 12, 40", "lines 9, 12, 40, 41 ... (7 shots)".
+/// The lines of a place: "line 9", "lines 9, 12, 40", "lines 9, 12, 40, 41 ... (7 shots)".
 std::string place_text(const Verification& v, std::size_t place) {
   constexpr std::size_t kShown = 4;
   const auto& shots = v.observations.shots[place];
@@ -259,7 +259,7 @@ struct Plane {
   std::vector<const verify::GridPoint*> points;
 };
 
-/// The layer of the grid nearest to `wanted`.
+/// The layer of the grid that is nearest to `wanted_m`.
 Plane plane_of(const verify::Comparison& c, Eigen::Index across, double wanted_m) {
   Plane plane{.across = across, .right = across == 0 ? 1 : 0, .up = across == 2 ? 1 : 2};
   const auto nearest =

@@ -35,8 +35,8 @@ Result<void> check_several(const VerifyArguments& arguments) {
   return {};
 }
 
-/// Usage unless there is a model and one kind of points, and for points of the running machine also
-/// a folder to keep them.
+/// Usage unless there is a model and exactly one source of points. Points of the running machine
+/// also need a folder in which they are kept.
 Result<void> check_verify(const VerifyArguments& arguments) {
   if (arguments.models.empty()) return fail(ErrorCode::Usage, "verify: give a model");
   const int given =
@@ -69,7 +69,8 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
   return options;
 }
 
-/// Usage if the tool offsets differ: the points were measured with one.
+/// Usage if the tool offsets of the models differ, because the points were measured with one tool
+/// offset.
 Result<void> check_tools(const std::vector<ModelAtPoints>& models) {
   constexpr double kSameTool_m = 1e-6;
   const auto& first = models.front();
@@ -96,7 +97,7 @@ Result<std::vector<ModelAtPoints>> models_of(const VerifyArguments& arguments) {
   return models;
 }
 
-/// V of a model where it is valid; `one` must outlive it.
+/// V of a model where the model is valid; `one` must outlive the result.
 verify::ErrorsAt errors_of(const ModelAtPoints& one) {
   return [&one](const calib::Vector3& reading_m) -> std::optional<calib::Vector3> {
     const auto& model = one.model.document.model;
@@ -106,7 +107,7 @@ verify::ErrorsAt errors_of(const ModelAtPoints& one) {
   };
 }
 
-/// The shots at places inside the validity volume that alone do not fit the model.
+/// Single shots that do not fit the model, at places inside the validity volume.
 std::vector<std::string> off_with_model(const VerificationFile& file,
                                         const verify::Observations& observed,
                                         const ModelAtPoints& one) {
@@ -120,20 +121,22 @@ std::vector<std::string> off_with_model(const VerificationFile& file,
     measured_m.push_back(at_m);
     corrected_m.emplace_back(reading_m + one.model.document.model.V_at(reading_m, one.tool_m));
   }
-  // An error of the size of those of the machine is one that the model does not know.
+  // An error as large as the errors of the machine may be an error that the model does not know;
+  // such points are not listed.
   auto off = calib::fit::points_off(measured_m, corrected_m, one.comparison.before.rms_m);
   for (auto& found : off.points) found.point = shots[found.point];
   return lines_of_points_off(
       file, off, "check or repeat this point; if it is right, the model is wrong there");
 }
 
-/// `error` with the usual mistakes that explain it.
+/// `error`, completed by the usual mistakes that may explain it.
 Error with_mistakes(Error error, const std::vector<std::string>& mistakes) {
   for (const std::string& text : mistakes) error.details.push_back("they fit with " + text);
   return error;
 }
 
-/// Of --details; nothing if it is not given. BadInput for a date that cannot be.
+/// The details in the file of option --details; empty if it is not given. BadInput for an
+/// impossible date.
 Result<CertificateDetails> details_of(const VerifyArguments& arguments) {
   if (arguments.details.empty()) return CertificateDetails{};
   auto details = read_certificate_toml(arguments.details);
@@ -145,7 +148,7 @@ Result<CertificateDetails> details_of(const VerifyArguments& arguments) {
       Error{ErrorCode::BadInput, arguments.details + ": dates are impossible", std::move(wrong)});
 }
 
-/// One model, also on the grid.
+/// Compares one model, also on the grid.
 Result<void> compare_one(Verification& v, const VerificationFile& file,
                          const verify::Options& options) {
   ModelAtPoints& one = v.models.front();
@@ -160,7 +163,8 @@ Result<void> compare_one(Verification& v, const VerificationFile& file,
   return {};
 }
 
-/// The places at which all models are valid: the models are compared at the same places.
+/// The observations at places at which all models are valid, so that all models are compared at the
+/// same places.
 verify::Observations inside_all(const verify::Observations& all,
                                 const std::vector<ModelAtPoints>& models) {
   verify::Observations common;
@@ -180,7 +184,7 @@ verify::Observations inside_all(const verify::Observations& all,
   return common;
 }
 
-/// Several models at the places where all are valid.
+/// Compares several models at the places where all of them are valid.
 Result<void> compare_each(Verification& v) {
   const auto common = inside_all(v.observations, v.models);
   v.inside = common.shots.size();

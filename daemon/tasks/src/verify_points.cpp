@@ -58,12 +58,12 @@ Result<LivePoints> points_of_recording(const std::string& file, const Progress& 
   return out;
 }
 
-/// What the points have in common with the models: where they come from, and their machine.
+/// The source of the points and their machine, for the comparison with the machines of the models.
 OfMachine of_points(const VerifyArguments& arguments, const std::string& machine) {
   return {arguments.live ? "the daemon" : printable_line(arguments.recording), machine};
 }
 
-/// The points for models of `machines`; sets `different` to different_machines().
+/// The points, for models of `machines`; sets `different` to the result of different_machines().
 Result<LivePoints> points_of(const VerifyArguments& arguments, std::vector<OfMachine> machines,
                              std::string& different, const Progress& progress) {
   const auto accept = [&](const std::string& machine) -> Result<void> {

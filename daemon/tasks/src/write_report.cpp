@@ -47,7 +47,7 @@ Result<ReportSubject> subject_named(const std::string& name, const ReportArgumen
   return subject;
 }
 
-/// All models of the machine in the store; one that cannot be read is shown and left out.
+/// All models of the machine in the store. A model that cannot be read is reported and left out.
 Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subject,
                                                      const ReportArguments& arguments,
                                                      const ShowLeftOut& show_left_out) {
@@ -73,7 +73,7 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
   return models;
 }
 
-/// The model of `option`, which must be of the same machine.
+/// The model that `option` names. It must belong to the same machine.
 Result<ReportSubject> other_subject(const std::string& option, const std::string& name,
                                     const ReportSubject& subject,
                                     const ReportArguments& arguments) {
@@ -101,7 +101,7 @@ Result<std::string> page_of(const ReportSubject& subject, const ReportArguments&
   return model_report(subject);
 }
 
-/// Empty if none is wanted.
+/// The certificate; empty if none is wanted.
 Result<std::string> certificate_of(const ReportSubject& subject, const ReportArguments& arguments) {
   if (arguments.dcc.empty()) return {};
   std::optional<ReportSubject> as_left;
@@ -113,7 +113,7 @@ Result<std::string> certificate_of(const ReportSubject& subject, const ReportArg
   return calibration_certificate(subject, as_left);
 }
 
-/// The files that are read; empty: not given.
+/// The files that the command reads; empty name: not given.
 std::vector<std::filesystem::path> files_read(const ReportArguments& arguments) {
   std::vector<std::filesystem::path> files{arguments.details};
   for (const std::string& model : {arguments.model, arguments.compare, arguments.as_left})
@@ -141,7 +141,7 @@ Result<void> check_report(const ReportArguments& arguments) {
   return require_all("--as-left", {{"--dcc", !arguments.dcc.empty()}});
 }
 
-/// Before anything is made.
+/// Checks the files before anything is made.
 Result<void> check_files(const ReportArguments& arguments, const std::string& out) {
   const std::array<std::filesystem::path, 3> written{out, arguments.dcc, arguments.pdf};
   ABBE_TRY(require_own_files(files_read(arguments), written));
@@ -149,7 +149,8 @@ Result<void> check_files(const ReportArguments& arguments, const std::string& ou
   return {};
 }
 
-/// Without the dates of the model itself: they cannot be corrected, and the report states them.
+/// Checks the dates of the details. Dates of the model itself are not checked, because they cannot
+/// be corrected; the report states them.
 Result<void> check_dates(const ReportSubject& subject) {
   auto wrong = contradictory_dates(subject, nullptr);
   const auto of_model = contradictory_times(subject);
@@ -176,7 +177,7 @@ Result<MadeReport> make_report(const ReportArguments& arguments, const ShowLeftO
   ABBE_TRY(subject);
   std::string out = arguments.out.empty() ? page_name(*subject, arguments) : arguments.out;
   ABBE_TRY(check_files(arguments, out));
-  // A certificate has its own, longer list of wrong dates.
+  // for a certificate, calibration_certificate() checks more dates
   if (arguments.dcc.empty()) ABBE_TRY(check_dates(*subject));
 
   auto page = page_of(*subject, arguments, show_left_out);

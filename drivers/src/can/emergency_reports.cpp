@@ -39,7 +39,7 @@ void EmergencyReports::on_frame(const can::CanFrame& frame, HostTime now) {
 }
 
 void EmergencyReports::on_emergency(Node& node, const can::Emergency& emergency, HostTime now) {
-  // A control repeats its emergency while the cause lasts; that is no other fault.
+  // A control repeats its emergency while the cause lasts; this is not a new fault.
   const bool repeated = node.code != 0 && node.latest && can::control_cause(emergency) &&
                         can::control_cause(emergency) == can::control_cause(*node.latest);
   if (repeated) {

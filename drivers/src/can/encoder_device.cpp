@@ -90,7 +90,7 @@ void EncoderDevice::check_timeouts(HostTime now) {
 }
 
 void EncoderDevice::follow_foreign_sync(HostTime now) {
-  if (bus_off()) return;                // silence proves nothing: no SYNC can be received
+  if (bus_off()) return;  // no conclusion from the silence: the controller cannot receive a SYNC
   if (!all_read_ && !sending_) return;  // unread frames may contain a SYNC
   const bool may_send = foreign_.may_send(now);
 
@@ -196,7 +196,8 @@ void EncoderDevice::follow_bus_off(HostTime now) {
     board_.fault(now, fmt::format("CAN {}: bus off", bus_->name()));
   } else if (sending_ && now - off_since_ <= ForeignSync::kShortBreak) {
     supervisor_.bus_recovered(now);
-  } else if (!external()) {  // another producer may have appeared meanwhile: listen again
+  } else if (!external()) {  // another producer may have appeared meanwhile, so the device listens
+                             // again
     stop_sending();
     foreign_.opened(now);
   }
@@ -248,7 +249,7 @@ void EncoderDevice::send_configuration() {
 }
 
 bool EncoderDevice::send(const can::CanFrame& frame) {
-  const auto at = time_.now();  // read before send(): no answer can be earlier
+  const auto at = time_.now();  // read before send(), because no answer can be earlier than this
   if (const auto sent = bus_->send({&frame, 1}); !sent) {
     if (sent.error().code != ErrorCode::Unreachable) {
       close_bus(sent.error());
@@ -305,7 +306,7 @@ void EncoderDevice::dispatch(const ReceivedFrame& received) {
   }
   if (received.echo) return;
   if (can::decode_sync(received.frame))
-    return foreign_.heard(received.time);  // does not show that a node is alive
+    return foreign_.heard(received.time);  // a SYNC does not show that a node is alive
   unreachable_ = false;
   last_heard_ = cycle_end_;
   together_.on_frame(received);

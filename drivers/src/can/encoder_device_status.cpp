@@ -69,7 +69,8 @@ void EncoderDevice::report_late_answers(HostTime now) {
   report_many_late(now);
 }
 
-/// A few late answers are only counted. Many late answers have a cause in the set-up of the bus.
+/// Reports late answers only if they are many, because many late answers have a cause in the set-up
+/// of the bus. A few are only counted.
 void EncoderDevice::report_many_late(HostTime now) {
   constexpr std::uint64_t kMany = 20;
   const auto late = receiver_.counters().late_frames;

@@ -42,7 +42,7 @@ bool is_final(const can::ConfigurationError& error) {
   }
 }
 
-/// "20 nm, configured is step_nm = 10".
+/// The configured and the reported step as text: "20 nm, configured is step_nm = 10".
 std::string steps(const EncoderAxis& axis, std::uint32_t seen) {
   const double configured = std::abs(axis.scale.value_or(0.0)) * kNanometresPerMetre;
   if (axis.kind == AxisKind::Linear)
@@ -133,7 +133,7 @@ void EncoderSupervisor::stop() {
 void EncoderSupervisor::bus_recovered(HostTime now) {
   for (auto& node : nodes_) {
     resets_.push_back(can::encode_nmt(can::NmtCommand::ResetCommunication, node.axis.node));
-    node.state = State::Waiting;  // until the boot-up message, or until retry_at
+    node.state = State::Waiting;  // the node waits for its boot-up message, or until retry_at
     node.retry_at = now + options_.sdo.timeout;
   }
 }
@@ -178,7 +178,7 @@ void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime 
     return;
   }
   if (node.state == State::Waiting && node.reported == ConfigurationFault::Silent) {
-    return configure(node, now);  // it sends heartbeats again
+    return configure(node, now);  // the configuration makes the node send heartbeats again
   }
   node.idle_beats = state == can::NodeState::Operational ? 0 : node.idle_beats + 1;
   if (node.state == State::Ready && node.idle_beats >= kIdleBeats) on_dropped(node, state, now);

@@ -39,7 +39,8 @@ void ForeignSync::heard(HostTime at) {
   last_ = at;
   if (at - first_ < kMeasureFor || intervals_ == 0) return;
   const auto mean = (at - first_) / static_cast<std::int64_t>(intervals_);
-  const bool complete = intervals_ > 1 && longest_ < mean * 3 / 2;  // else SYNCs may be missing
+  // otherwise SYNCs may be missing
+  const bool complete = intervals_ > 1 && longest_ < mean * 3 / 2;
 
   if (!period_ || complete) period_ = mean;
   first_ = at;

@@ -49,7 +49,8 @@ std::size_t PendingSync::settle(std::span<const ReceivedFrame> came, std::span<R
 
 /// Converts the echo to the frame for the receiver; nullopt if the receiver must not see the echo.
 std::optional<ReceivedFrame> PendingSync::settle_echo(const ReceivedFrame& echo) {
-  if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;  // earlier SYNC
+  // the echo of an earlier SYNC
+  if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;
   std::optional<ReceivedFrame> sync;
   if (pending()) {
     sync = echo.time_widened ? as_sent() : echo;

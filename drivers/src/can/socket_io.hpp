@@ -32,7 +32,7 @@ inline void wait_readable(int fd, std::chrono::nanoseconds wall) {
   const auto ns = std::max<std::int64_t>(wall.count(), 0);
   const timespec timeout{static_cast<time_t>(ns / kSecond), static_cast<long>(ns % kSecond)};
   pollfd poll{fd, POLLIN, 0};
-  ppoll(&poll, 1, &timeout, nullptr);  // interrupted: returns early
+  ppoll(&poll, 1, &timeout, nullptr);  // if a signal interrupts the wait, it returns early
 }
 
 /// Enables software receive timestamps. Hardware timestamps are not used: they come from another

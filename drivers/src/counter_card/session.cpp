@@ -10,7 +10,7 @@ namespace {
 
 using protocol::HostTime;
 
-constexpr unsigned kMostStatusTries = 100;  // as the manufacturer's library
+constexpr unsigned kMostStatusTries = 100;  // same value as in the manufacturer's library
 
 std::string in_milliseconds(std::chrono::nanoseconds d) {
   return fmt::format("{} ms", std::chrono::duration_cast<std::chrono::milliseconds>(d).count());
@@ -97,7 +97,8 @@ CardAction CounterCardSession::is_missing(Input input, HostTime now) {
     case Input::BulkStopped:
       return fail(
           now, fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
-    case Input::Scans:  // also while a status request is pending: a failed card does not answer it
+    // this also applies while a status request is pending, because a failed card does not answer it
+    case Input::Scans:
       return restart_scan(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
   }
 

@@ -113,7 +113,7 @@ bool EnvironmentDevice::ensure_open(nanoseconds at_most) {
   if (on_line()) return true;
   const auto now = time_.now();
   if (const auto from = due(); now < from) {
-    // A device of a shared line does not sleep: other devices use the line meanwhile.
+    // A device on a shared line does not sleep, because other devices use the line meanwhile.
     if (own_link_)
       std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{from - now})));
     return false;

@@ -18,7 +18,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr int kDataBits = 8;  // RTU always has 8
+constexpr int kDataBits = 8;  // RTU always has 8 data bits
 
 tl::unexpected<Error> failed(std::string_view what, int error) {
   const auto code = error == ETIMEDOUT ? ErrorCode::Timeout : ErrorCode::Unreachable;

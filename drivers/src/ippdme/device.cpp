@@ -9,7 +9,7 @@
 namespace abbe::drivers {
 namespace {
 
-/// Host time. A state that is not stored after this is reported; a healthy disk needs some ms.
+/// Longest host time for storing a state; a longer time is reported. A healthy disk needs a few ms.
 constexpr std::chrono::seconds kSavedSoon{1};
 constexpr auto kOutcomes = static_cast<std::uint64_t>(IppStopOutcome::NotSent) + 1;
 
@@ -46,7 +46,8 @@ IppDevice::~IppDevice() {
 
 IppStop IppDevice::finish() {
   if (ended_) return session().stop();
-  read_stops(requests_.take());  // of a person, since the last cycle: they hold the machine
+  // stop requests of people since the last cycle; they hold the machine
+  read_stops(requests_.take());
   handle(IppStopRequested{});
   await_standstill();
   session().give_up_stop();
@@ -57,7 +58,7 @@ IppStop IppDevice::finish() {
   return session().stop();
 }
 
-/// Waits until AbortE is answered: if the connection were closed before, the machine might not
+/// Waits until AbortE is answered. If the connection were closed earlier, the machine might not
 /// stop.
 void IppDevice::await_standstill() {
   constexpr auto kLook = std::chrono::milliseconds{20};
@@ -131,8 +132,8 @@ IppStop IppDevice::last_stop() const {
           .text = stop_text_.read().text};
 }
 
-/// What a person must know at once: that the machine may be moving, or that a restart would not
-/// know its state.
+/// Shows the condition that a person must know at once: the machine may be moving, or its state is
+/// not stored, so that abbed would not know it after a restart.
 void IppDevice::show_condition() {
   std::string condition = session().danger();
   const auto add = [&condition](std::string_view what) {
@@ -177,9 +178,9 @@ DeviceStatus IppDevice::status() const {
   return board_.read(options_.name, touches_.dropped() + positions_.dropped(), raw_.dropped());
 }
 
-/// First without the session, whose state is unknown after an exception: it may count AbortE as
-/// sent although it is not. A second AbortE changes nothing. A message of the server that caused
-/// the exception is not handled again.
+/// First sends AbortE without the session, because the state of the session is unknown after an
+/// exception: the session may assume that AbortE was sent although it was not. A second AbortE has
+/// no further effect. A message of the server that caused the exception is not handled again.
 bool IppDevice::stop_after_failure() {
   if (!session().may_move()) return false;
   emergency_stop_.set_moving(true);
@@ -192,8 +193,8 @@ bool IppDevice::stop_after_failure() {
   return session().may_move();
 }
 
-/// Stops first: an exception from a later request must not lose one. Paths and releases before the
-/// last stop are discarded.
+/// Reads the requests, stop requests first, because an exception from a later request must not lose
+/// a stop. Paths and releases before the last stop are discarded.
 void IppDevice::read_requests() {
   const auto requests = requests_.take();
   const auto after_last_stop = std::find_if(requests.rbegin(), requests.rend(), is_stop).base();

@@ -32,9 +32,9 @@ IppAction IppSession::stopped_moving() {
 }
 
 /// AbortE was not answered: the next connection begins with another AbortE. Some servers do not
-/// answer AbortE outside a session. So if AbortE was sent outside a session, the next connection
-/// starts a session before it sends AbortE, and the connection after that does not. No session is
-/// started for a machine that is held.
+/// answer AbortE outside a session. Therefore, if AbortE was sent outside a session, the next
+/// connection starts a session before it sends AbortE. The connection after that sends AbortE
+/// outside a session again. No session is started for a machine that is held.
 IppAction IppSession::abort_unanswered() {
   const std::string what =
       fmt::format("no answer to AbortE in {:g} s: the machine may still be moving",
@@ -97,7 +97,8 @@ void IppSession::settle(IppStopOutcome outcome, std::string text) {
 IppAction IppSession::take(const IppAbortRequested& request) {
   stop_ = {std::max(stop_.number, request.number), IppStopOutcome::Pending, {}};
   points_.clear();
-  if (state_ == IppState::Aborting) return IppNothing{};  // its answer is the outcome
+  // the answer to the running AbortE is the outcome
+  if (state_ == IppState::Aborting) return IppNothing{};
   if (moving_ && open_) return stop_motion_by_request(request.reason);
   if (moving_) {
     asked_reason_ = request.reason;
@@ -144,8 +145,7 @@ bool IppSession::releasable() const noexcept {
   return !stopped_ && (state_ == IppState::AwaitingRelease || (held_ && trying));
 }
 
-/// An operator has released the machine. This is the only place where errors of the machine are
-/// cleared.
+/// Handles the release by an operator. Only here are errors of the machine cleared.
 IppAction IppSession::take(const IppReleaseRequested&) {
   if (!releasable()) return IppNothing{};
   settle(IppStopOutcome::NotSent, "a person has released the machine before AbortE was sent");
@@ -165,8 +165,8 @@ IppAction IppSession::take(const IppReleaseRequested&) {
   return IppNothing{};
 }
 
-/// A hold that follows the answer to AbortE follows it also when the session ends before: the next
-/// start of abbed awaits a release.
+/// Ends the session. If AbortE is outstanding and its answer would begin a hold, the hold also
+/// applies if the session ends before the answer: the next start of abbed awaits a release.
 IppAction IppSession::take(const IppStopRequested&) {
   if (std::exchange(stopped_, true)) return IppNothing{};
   points_.clear();

@@ -1,5 +1,5 @@
 #pragma once
-/// Texts of the session: commands for the server, and errors of the server as messages.
+/// Texts of the session: commands for the server, and messages about errors of the server.
 
 #include <string>
 #include <string_view>

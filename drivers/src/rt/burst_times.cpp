@@ -14,7 +14,8 @@ namespace {
 /// Points measured before a beam break may arrive after its report. The beam has returned at the
 /// first point after a gap of at least this duration, and of at least three point separations.
 constexpr std::chrono::milliseconds kShortestBreak{20};
-/// A point that arrives later than this was stored by a stalled network; a controller stores less.
+/// A point that arrives later than this has a wrong time: neither a controller nor a stalled
+/// network delays points by a minute.
 constexpr std::chrono::minutes kLongestDelay{1};
 
 }  // namespace
@@ -56,8 +57,8 @@ void BurstTimes::assign_mean(TrackerPoint& point, std::chrono::nanoseconds durat
   mark_pending(point.head);
 }
 
-/// Without observations the clock model accepts any time: then a large step within the burst shows
-/// it.
+/// True if the time is ahead of the arrival. While the clock model has no observations it accepts
+/// any time; then a large step within the burst shows a wrong time.
 bool BurstTimes::is_ahead(protocol::DeviceTime t) const ABBE_RT {
   if (clock_.is_ahead(t, arrival_)) return true;
   return !clock_.has_observations() && times_.known() &&
@@ -65,7 +66,8 @@ bool BurstTimes::is_ahead(protocol::DeviceTime t) const ABBE_RT {
 }
 
 /// Judges the points from `first` on, up to the first one on a new time base; returns its index, or
-/// the number of points. The points that were refused until the new base was certain belong to it.
+/// the number of points. The points that were refused before the new base was certain also belong
+/// to the new base.
 std::size_t BurstTimes::judge(Points points, std::size_t first) ABBE_RT {
   for (std::size_t k = first; k < points.size(); ++k) {
     const auto t = points[k].device_time;
@@ -118,8 +120,8 @@ void BurstTimes::set_time(TrackerPoint& point) const ABBE_RT {
   if (!instant.settled) point.head.flags |= SampleFlag::ClockUnsettled;
 }
 
-/// The time of the point does not fit those of the others. Its instant is then not known: it gets
-/// its arrival, so that it does not lie in the future or hours ago.
+/// Handles a point whose time does not fit those of the others. Its instant is not known. It gets
+/// its arrival time, so that its time is neither in the future nor hours ago.
 void BurstTimes::refuse(TrackerPoint& point) ABBE_RT {
   ++counters_.time_disorder;
   point.head.flags |= SampleFlag::PointInvalid;

@@ -22,8 +22,8 @@ bool LatchTracker::on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw,
                            std::int64_t clock_count, std::int64_t previous_clock_count) ABBE_RT {
   if (latch_raw == last_raw_) return false;
   last_raw_ = latch_raw;
-  // Latch count minus clock count. The readings wrap; the known offset tells which multiple of
-  // their range to add.
+  // Difference latch count minus clock count. The readings wrap; the known offset determines the
+  // multiple of their range that must be added.
   const std::uint64_t base = offset_ ? static_cast<std::uint64_t>(offset_->low) : 0;
   const std::int64_t ahead =
       static_cast<std::int64_t>(base) +

@@ -21,8 +21,8 @@ constexpr double kJumpSeenWithin_s = 1.0;
 constexpr double kLatest_s = 3.0;
 constexpr double kMostAhead_s = 1.0;
 constexpr double kLargestDrift = 1e-3;
-/// Largest interval between the two limits, as a share of the clock counter's range. In a wider
-/// interval a counter that restarted would often be accepted by chance.
+/// Largest interval between the two limits, as a fraction of the clock counter's range. With a
+/// wider interval, a counter that restarted would often be accepted by chance.
 constexpr double kWidestInterval = 0.02;
 
 /// The corresponding limits for counters of an earlier run of the program. Both instants come from
@@ -33,8 +33,9 @@ constexpr double kResumedWithin_s = std::chrono::duration<double>(ClockModelOpti
 constexpr double kResumedDrift = ClockModelOptions{}.max_skew;
 constexpr double kResumedShown_s = 0.25;    // enough time to process the backlog of a delayed host
 constexpr double kResumedPatience_s = 3.0;  // as kLatest_s
-/// The corresponding share. It is smaller because no process watched the card between the two runs:
-/// its counters may have been set up again shortly after.
+/// Same as kWidestInterval, for counters of an earlier run. It is smaller because no process
+/// observed the card between the two runs: its counters may have been set up again shortly after
+/// the first run.
 constexpr double kWidestResumed = 0.005;
 
 std::uint32_t saturated(std::uint64_t n) ABBE_RT {
@@ -117,7 +118,7 @@ std::optional<quad08::RawScan> CounterCardReceiver::next_raw() ABBE_RT {
   if (auto scan = decoder_.next()) return scan;
   if (seeking_) {
     seek();
-    if (auto scan = decoder_.next()) return scan;  // from the window; pending_ follows
+    if (auto scan = decoder_.next()) return scan;  // from the window; pending_ is used afterwards
   }
   if (seeking_ || pending_.empty()) return std::nullopt;
   decoder_.push(std::exchange(pending_, {}));

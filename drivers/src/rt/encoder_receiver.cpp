@@ -328,8 +328,9 @@ void EncoderReceiver::end_bus_off() ABBE_RT {
   restarted_pending_ = true;
 }
 
-/// The first count is used as sent (an absolute scale may be negative); that of a rotary axis may
-/// be whole ranges of the encoder away from the travel of the axis, whose middle is then nearest.
+/// The first count of an axis. It is used as sent, because an absolute scale may be negative. For a
+/// rotary axis, the first count may differ from the travel by whole ranges of the encoder; the
+/// count nearest to the middle of the travel is used.
 std::int64_t EncoderReceiver::first_count(const Axis& axis, std::int64_t count) ABBE_RT {
   if (!axis.middle || axis.modulus == 0 || axis.scale == 0.0) return count;
   constexpr double kMostCounts = 0x1p62;
@@ -407,7 +408,8 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
     bus_off_ = true;
     release();
     const auto last = open_ ? *sync_time_ + sampling_delay_ : time;
-    emit(last);  // immediately: until the deadline subscribers would use the previous sample
+    // immediately, because until the deadline subscribers would use the previous sample
+    emit(last);
   } else if (back && bus_off_) {
     bus_off_ = false;
     restarted_pending_ = true;
@@ -415,7 +417,8 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
 }
 
 void EncoderReceiver::on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT {
-  if (external_sync_) return;  // SDOs of the machine's master; the PDO mapping is configured
+  // these are SDOs of the machine's master; the PDO mapping is configured in abbed.toml
+  if (external_sync_) return;
   const auto index = static_cast<std::uint16_t>(frame.byte(1) | (frame.byte(2) << 8));
   const can::ObjectId object{index, frame.byte(3)};
   constexpr std::uint8_t kWritten = 0x60;
@@ -479,7 +482,8 @@ void EncoderReceiver::read_object(Axis& axis, can::ObjectId object, std::uint32_
   }
 }
 
-/// The encoder reports the number of counts after which its position wraps; 0 and 1 are no range.
+/// Sets the number of counts after which the position wraps, as the encoder reports it. The values
+/// 0 and 1 are invalid and are ignored.
 void EncoderReceiver::wrap_at(Axis& axis, std::uint64_t counts) ABBE_RT {
   if (axis.wrap_configured || counts <= 1) return;
   axis.modulus = axis.type == can::PositionType::Signed64 ? counts : std::min(counts, kModulus32);

@@ -67,7 +67,7 @@ Progress EnvironmentReceiver::accept(std::span<const std::byte> registers) ABBE_
 Progress EnvironmentReceiver::prove(std::span<const std::byte> registers) ABBE_RT {
   const auto& proving = map_.proving[read_];
   const double value = modbus::decode_register(registers, proving.place.type, proving.place.order);
-  if (!(value == proving.expected))  // also fails for NaN
+  if (!(value == proving.expected))  // the comparison also fails for NaN
     return fail({.kind = Kind::Unproven, .index = read_, .value = value, .request = *pending_});
   pending_.reset();
   if (++read_ == proving_reads_.size()) {

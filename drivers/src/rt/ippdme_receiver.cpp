@@ -18,7 +18,7 @@ using std::chrono::nanoseconds;
 
 constexpr double kMetresPerMillimetre = 1e-3;
 constexpr double kCountsPerMillimetre = 1e6;  // the machine reports no counts: nanometres instead
-constexpr int kRepairable = 2;                // severity from which on the command has failed
+constexpr int kRepairable = 2;                // severity: from this value on the command has failed
 
 IppText text_of(std::string_view text) noexcept {
   IppText t;
@@ -34,7 +34,8 @@ std::string_view chars(std::span<const std::byte> bytes) noexcept {
 /// The point of a touch made by the operator, PtMeas(X(..),Y(..),Z(..)); empty: other data.
 std::string_view picked(std::string_view data) noexcept {
   constexpr std::string_view kFront = "PtMeas(";
-  // Not starts_with(): without inlining, the library's version calls a function that can throw.
+  // starts_with() is not used: without inlining, the library's version calls a function that can
+  // throw.
   if (data.size() <= kFront.size() || !std::equal(kFront.begin(), kFront.end(), data.begin()))
     return {};
   if (data.back() != ')') return {};
@@ -149,7 +150,8 @@ std::optional<IppMessage> IppReceiver::understand(std::string_view line) ABBE_RT
   return data(*response, line);
 }
 
-/// Time of an event between `from` and the arrival: the middle, with rectangular uncertainty.
+/// The time of an event between `from` and the arrival: the middle of the interval, with a
+/// rectangular uncertainty.
 SampleHead IppReceiver::between(HostTime from) ABBE_RT {
   const nanoseconds half = std::max(nanoseconds{0}, arrival_ - from) / 2;
   SampleHead head;
@@ -164,7 +166,7 @@ std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response,
   const bool unsolicited = response.tag == ippdme::kUnsolicited;
   const std::string_view by_hand = unsolicited ? picked(response.data) : std::string_view{};
   if (by_hand.empty() && (asked == nullptr || asked->purpose == Purpose::Other)) {
-    if (unsolicited) return std::nullopt;  // a key or a changed property: not used
+    if (unsolicited) return std::nullopt;  // a key was pressed or a property has changed: not used
     return IppMessage{IppData{response.tag, text_of(response.data)}};
   }
   const auto point = ippdme::parse_point(unsolicited ? by_hand : response.data);

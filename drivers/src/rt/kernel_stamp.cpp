@@ -20,7 +20,7 @@ Arrival KernelStampMap::arrival(std::optional<std::chrono::nanoseconds> stamp, c
 }
 
 bool KernelStampMap::believable(std::chrono::nanoseconds age, const ClockPair& now) const ABBE_RT {
-  if (!empty_at_) return false;  // no bound of the age yet
+  if (!empty_at_) return false;  // there is no bound of the age yet
   const auto possible = now.monotonic - empty_at_->monotonic;
   const auto stepped = (now.realtime - empty_at_->realtime) - possible;
   return age.count() >= 0 && age <= possible + options_.step &&

@@ -130,8 +130,8 @@ void TouchDetector::touched() ABBE_RT {
 }
 
 bool TouchDetector::retracted(const CounterScan& scan) const ABBE_RT {
-  // Without positions or an approach direction the retraction is unknown: only the time without
-  // edges decides.
+  // Without positions or an approach direction the retraction is unknown; only the time without
+  // edges is then decisive.
   if (touch_.missing_mask != 0 || scan.axes.missing_mask != 0 || touch_.speed_m_s == 0.0)
     return true;
   double back_m = 0.0;

@@ -16,7 +16,8 @@ using protocol::TouchFlag;
 using std::chrono::nanoseconds;
 using Axes = std::array<double, protocol::kMaxAxes>;
 
-constexpr double kLostScans = 2.5;  // scan periods between neighbouring scans: one may be lost
+// largest interval between neighbouring scans, in scan periods: one scan may be lost
+constexpr double kLostScans = 2.5;
 
 double seconds(nanoseconds d) noexcept {
   return 1e-9 * static_cast<double>(d.count());

@@ -17,8 +17,8 @@ constexpr double kZeroCelsius_K = 273.15;
 constexpr double kPascalsPerMillibar = 100.0;
 constexpr double kPerPercent = 0.01;
 
-/// Period in which weather that does not change is passed on again: a check that refused it can
-/// judge it again.
+/// Unchanged weather is passed on again with this period, so that a check that refused it can check
+/// it again.
 constexpr std::chrono::seconds kWeatherRepeated{10};
 
 SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {

@@ -8,8 +8,8 @@
 namespace abbe::drivers {
 namespace {
 
-// Two marks of a scale are a whole number of signal periods apart. A larger deviation from a whole
-// number, in periods, is not noise.
+// The distance of two marks of a scale is a whole number of signal periods. A deviation from a
+// whole number by more than this, in periods, is not caused by noise.
 constexpr double kMostFraction = 0.25;
 
 tl::unexpected<Error> bad(std::string what) {

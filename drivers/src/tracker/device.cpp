@@ -74,7 +74,8 @@ void TrackerDevice::restore_settings() {
 }
 
 void TrackerDevice::handle_orders() {
-  keep_report();  // the session stores only one: keep that of an order that has just ended
+  // keeps the report of an order that has just ended, because the session stores only one
+  keep_report();
   for (TrackerOrder& order : orders_.take()) {
     handle(std::move(order));
     keep_report();
@@ -116,7 +117,7 @@ void TrackerDevice::report_times() {
   }
 }
 
-/// Reports why there are no points, if that is no fault. show() reports faults.
+/// Reports the reason why there are no points, if it is not a fault. Faults are reported by show().
 void TrackerDevice::report_cause() {
   const std::string& cause = session().cause();
   if (cause == cause_reported_) return;

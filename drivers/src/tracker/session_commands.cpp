@@ -78,8 +78,8 @@ TrackerAction TrackerSession::plan_done() {
       streaming();
       return TrackerNothing{};
     case Goal::Stay:
-      // A result that arrived during these requests has not started the next measurement: it is
-      // started here.
+      // A result that arrived while these requests were sent did not start the next measurement. It
+      // is started here.
       return result_came_ && state_ == TrackerState::Streaming ? measure_again()
                                                                : TrackerAction{TrackerNothing{}};
     case Goal::SetUp:

@@ -165,7 +165,7 @@ TrackerAction TrackerSession::begin_order() {
   const bool measuring = state_ == Streaming || state_ == BeamLost;
 
   if (order.what == TrackerOrder::What::ListReflectors) {
-    const auto restart_at = deadlines_.at(Due::Restart);  // keep a planned StartMeasurement
+    const auto restart_at = deadlines_.at(Due::Restart);  // keeps a planned StartMeasurement
     new_plan(Goal::Stay);
     deadlines_.set(Due::Restart, restart_at);
     plan(std::nullopt, emscon::GetReflector{}, true, true);
@@ -223,8 +223,8 @@ void TrackerSession::end_order(Outcome outcome, const std::string& text) {
   if (report.done() && order_->what == TrackerOrder::What::ListReflectors)
     report.reflectors = reflectors_;
   if (report.done() && order_->what == TrackerOrder::What::SetReflector) {
-    options_.reflector = order_->reflector;  // applies to later connections, too
-    reflector_before_.reset();               // the operator's choice is not restored
+    options_.reflector = order_->reflector;  // this reflector is also used for later connections
+    reflector_before_.reset();  // the reflector that the operator chose is not replaced at the end
   }
   report_ = std::move(report);
   order_.reset();

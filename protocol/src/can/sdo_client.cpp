@@ -50,7 +50,8 @@ void SdoClient::send_initiate() noexcept {
 }
 
 void SdoClient::send(const CanFrame& frame) noexcept {
-  if (outbox_count_ == outbox_.size()) {  // the caller did not take the frames: drop the oldest
+  if (outbox_count_ == outbox_.size()) {  // the caller did not take the frames: the oldest frame is
+                                          // dropped
     outbox_head_ = (outbox_head_ + 1) % outbox_.size();
     --outbox_count_;
   }

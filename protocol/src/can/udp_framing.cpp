@@ -152,7 +152,8 @@ bool DatagramView::next(CanFrame& frame) ABBE_RT {
   if (left_ == 0) return false;
   --left_;
   std::size_t used = 0;
-  if (read_frame(rest_, frame, used)) return false;  // cannot happen: parse() checked all frames
+  // this cannot happen, because parse() has checked all frames
+  if (read_frame(rest_, frame, used)) return false;
   rest_ = rest_.subspan(used);
   return true;
 }

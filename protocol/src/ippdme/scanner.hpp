@@ -24,7 +24,7 @@ class Scanner {
   /// A name, BasicName {"." BasicName}; empty if there is none.
   [[nodiscard]] std::string_view name() ABBE_RT;
   [[nodiscard]] tl::expected<double, LineError> number() ABBE_RT;
-  /// "text" without the quotes.
+  /// A text in quotes, returned without them.
   [[nodiscard]] std::optional<std::string_view> string() ABBE_RT;
 
  private:

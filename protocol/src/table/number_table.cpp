@@ -44,8 +44,9 @@ std::string quoted(std::string_view text) {
   return '"' + std::string(text) + '"';
 }
 
-/// What the content of an invalid cell or column name is besides: an error value of a spreadsheet,
-/// or text with a character that looks like another one or like none. Empty if neither.
+/// A remark about the content of an invalid cell or column name: it is an error value of a
+/// spreadsheet, or has a character that looks like another one or is invisible. Empty if neither
+/// applies.
 std::string remark(std::string_view text) {
   if (is_spreadsheet_error(text))
     return ", an error value of a spreadsheet: correct the formula, or delete the row";
@@ -53,7 +54,7 @@ std::string remark(std::string_view text) {
   return strange.empty() ? strange : ", contains " + strange;
 }
 
-/// Says what a cell with the content `text` should hold instead.
+/// Text that states the content that the cell with the text `text` should have.
 std::string expected(std::string_view text, const std::vector<std::string_view>& words) {
   constexpr std::size_t kFew = 6;
   return words.size() <= kFew ? "must be " + joined(words, " or ")
@@ -198,7 +199,7 @@ std::optional<NumberTable> parse_numbers(std::string_view text, const std::vecto
   const auto index = choose_form(forms, header);
   const auto& form = forms[index];
   auto target = map_header(form, header, lines.number(), faults);
-  if (faults.any()) return std::nullopt;  // every row would be reported as a fault
+  if (faults.any()) return std::nullopt;  // without this, every row would be reported as a fault
 
   std::vector<bool> present(form.size(), false);
   for (const auto column : target) present[column] = true;

@@ -137,7 +137,7 @@ void add_missing_header(std::size_t line, std::size_t columns, const std::vector
                  headers);
 }
 
-/// True for a line of values only.
+/// True for a line that contains only values.
 bool has_no_names(const std::vector<Cell>& cells, const std::vector<TableForm>& forms) {
   return std::all_of(cells.begin(), cells.end(),
                      [&](const Cell& cell) { return is_value(cell.text, forms); });

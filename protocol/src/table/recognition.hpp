@@ -14,8 +14,8 @@ namespace abbe::protocol {
 /// Adds a fault and returns true if the bytes are not plain text: UTF-16, or a spreadsheet file.
 [[nodiscard]] bool recognised_bytes(std::string_view text, Faults& faults);
 
-/// Adds a fault for each reason that the first line (`lines` stands on it) gives, and for decimal
-/// commas in the lines after it. Returns true if it added one; the file is then not parsed.
+/// Adds a fault for each reason that the first line gives (`lines` is positioned on it), and for
+/// decimal commas in the lines after it. Returns true if it added one; the file is then not parsed.
 [[nodiscard]] bool recognised_first_line(std::string_view first, Lines lines,
                                          const std::vector<TableForm>& forms, Faults& faults);
 
@@ -28,7 +28,7 @@ namespace abbe::protocol {
 [[nodiscard]] bool has_decimal_commas(std::string_view line, const TableForm& form,
                                       std::size_t columns);
 
-/// What to do about decimal commas.
+/// Advice for decimal commas.
 inline constexpr std::string_view kWritePoints =
     "write 0.5, not 0,5 (in a spreadsheet: export with a language that has decimal points, for "
     "example English)";

@@ -90,7 +90,7 @@ class Cells {
   return cells;
 }
 
-/// Sets `value`. Returns what is wrong with the cell; empty if it is valid.
+/// Sets `value` to the number in the cell. Returns the fault of the cell; empty if it is valid.
 [[nodiscard]] inline std::string_view parse_cell(std::string_view text, double& value) {
   return parse_decimal(text, value);
 }

@@ -24,7 +24,7 @@ py::array column(const std::vector<T>& values) {
   return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// `width` numbers a row.
+/// An array with `width` numbers in each row.
 template <class T>
 py::array table(const std::vector<T>& values, std::size_t width) {
   const auto rows = width == 0 ? 0 : values.size() / width;
@@ -32,7 +32,7 @@ py::array table(const std::vector<T>& values, std::size_t width) {
                         values.data());
 }
 
-/// What all samples have.
+/// The columns that all kinds of samples have.
 struct HeadColumns {
   std::vector<std::int64_t> time_ns, u_time_ns;
   std::vector<std::uint32_t> flags, lost_before;
@@ -84,7 +84,7 @@ struct AxisColumns {
 
   void add(const protocol::AxisSample& sample) {
     if (axes == 0) axes = sample.axis_count;
-    if (sample.axis_count != axes) return;  // of one device it does not change
+    if (sample.axis_count != axes) return;  // for one device the number of axes does not change
     head.add(sample.head);
     cycle.push_back(sample.cycle);
     missing_mask.push_back(sample.missing_mask);
@@ -156,7 +156,7 @@ py::dict as_dict(const ByDevice<Columns>& devices) {
   return out;
 }
 
-/// {"tracker": {DEVICE: columns}, "axes": ..., "environment": ..., "touches": ...}.
+/// Returns {"tracker": {DEVICE: columns}, "axes": ..., "environment": ..., "touches": ...}.
 py::dict streams(const RecordingReader& reader) {
   ByDevice<TrackerColumns> tracker;
   ByDevice<AxisColumns> axes;

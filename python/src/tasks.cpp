@@ -1,5 +1,5 @@
-// Requests for a calibration from the files of a user, as JSON texts: read and checked as the
-// command line does.
+// Requests for a calibration from the files of a user, as JSON texts. The files are read and
+// checked as the command line does it.
 #include <pybind11/stl.h>
 
 #include <filesystem>
@@ -46,7 +46,8 @@ daemon::MfbRequest::File with_text(const std::string& file) {
   return {std::filesystem::path(file).filename().string(), value_or_raise(daemon::read_text(file))};
 }
 
-/// Bar and plan are checked here, so that the message names the files as they were given.
+/// The request for method mfb. Bar and plan are also checked here, so that messages contain the
+/// file names as the user gave them.
 std::string mfb_task(const std::string& bar, const std::string& plan) {
   daemon::MfbRequest request{with_text(bar), with_text(plan), {}};
   const auto read = value_or_raise(daemon::parse_bar_toml(request.bar.text, bar));

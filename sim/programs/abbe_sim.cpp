@@ -107,7 +107,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return abbe::sim::run(argc, argv);
-  } catch (const std::exception& e) {  // e.g. out of memory: the program cannot continue
+  } catch (const std::exception& e) {  // for example out of memory: the program cannot continue
     std::fprintf(stderr, "abbe-sim: %s\n", e.what());
     return abbe::sim::kIoFailed;
   }

@@ -1,5 +1,5 @@
-/// abbe-sim bar: a simulated measuring machine calibrates a Multi-Feature Bar by reversal; the
-/// files for `abbe identify bar`, and the true bar.
+/// abbe-sim bar: a simulated measuring machine calibrates a Multi-Feature Bar by reversal. The
+/// command writes the files for `abbe identify bar`, and the true bar.
 
 #include <fmt/format.h>
 
@@ -20,13 +20,14 @@ namespace abbe::sim {
 namespace {
 
 struct ReversalCommandOptions : BarOptions {
-  SetupChoices choices;  ///< with a [sim] table the measuring machine is simulated, too
+  SetupChoices choices;  ///< with a [sim] table the measuring machine is simulated as a device, too
   std::string ports_file;
   std::size_t repeats = 5;
   double shape_scatter_um = 0.3;
   std::vector<double> gauge_beside_mm{0.0, 0.0};
   double u_rotation_urad = 2.0, gauge_step_mm = 25.0, u_gauge_um = 0.15, u_gauge_um_per_m = 0.75;
-  double inclined_mrad = 0.0;  ///< of bar and gauge; the plan states X
+  /// inclination of bar and gauge; the plan states that they are along X
+  double inclined_mrad = 0.0;
   std::vector<double> gauge_turned_mrad{0.0, 0.0};
   double gauge_alignment_mrad = 0.25;
   std::string gauge_travel = "bar";
@@ -61,7 +62,7 @@ struct Reversal {
   mfb::TrueBar bar;
   TruthMachine machine;
   mfb::StepGauge gauge;          ///< as gauge.toml states it
-  mfb::ReversalOptions applied;  ///< as it is simulated
+  mfb::ReversalOptions applied;  ///< options of the simulation
 };
 
 Result<Reversal> reversal_of(const ReversalCommandOptions& options) {
@@ -82,10 +83,11 @@ Result<Reversal> reversal_of(const ReversalCommandOptions& options) {
   return out;
 }
 
-/// The files of `abbe identify bar` and `abbe calibrate bar`. `points`: a file more, or none.
+/// Writes the files of `abbe identify bar` and `abbe calibrate bar`. `points`: a further file, or
+/// none.
 Result<void> write_files(const ReversalCommandOptions& options, const Reversal& reversal,
                          const mfb::ReversalRun& run, std::vector<NamedText> points) {
-  constexpr double kTolerance_um = 50.0;  // of the maker
+  constexpr double kTolerance_um = 50.0;  // tolerance of the manufacturer
   const mfb::TrueBar& bar = reversal.bar;
   mfb::StatedBar nominal =
       mfb::nominal_bar(bar.pattern, Eigen::Vector3d::Constant(kTolerance_um * kFromMicro));
@@ -112,7 +114,7 @@ int run_offline(const ReversalCommandOptions& options, const Reversal& reversal)
   return kDone;
 }
 
-/// Faces across the gauge.
+/// The faces of the gauge, which are across it.
 std::vector<Face> faces_of_gauge(const Reversal& reversal) {
   constexpr double kHalfSize_m = 4e-3;
   const Eigen::Vector3d outward = -mfb::gauge_direction(reversal.applied);
@@ -125,7 +127,8 @@ std::vector<Face> faces_of_gauge(const Reversal& reversal) {
   return faces;
 }
 
-/// The measuring machine over I++ DME: one clamping of the bar after the other, then the gauge.
+/// Simulates the measuring machine over I++ DME: on its table are one clamping of the bar after the
+/// other, then the gauge.
 int run_live(const ReversalCommandOptions& options, Reversal reversal) {
   auto setup = load_setup(options.choices);
   if (!setup) return report(setup.error());

@@ -41,16 +41,16 @@ struct BarOptions {
 void add_bar_options(CLI::App& app, BarOptions& options);
 
 [[nodiscard]] mfb::TrueBar bar_of(const BarOptions& options);
-/// What the files state: noise and uncertainties. Usage: an outlier that is not TOUCH=UM, a turned
-/// bar that is not NAME=AXIS.
+/// The values that the files state: noise and uncertainties. Usage: an outlier that is not
+/// TOUCH=UM, or a turned bar that is not NAME=AXIS.
 [[nodiscard]] Result<mfb::ProbingOptions> probing_of(const BarOptions& options);
-/// What is simulated with `stated`: the same, or without any noise and uncertainty (--exact).
+/// The values that are simulated: those of `stated`, or no noise and uncertainty at all (--exact).
 [[nodiscard]] mfb::ProbingOptions simulated(const mfb::ProbingOptions& stated,
                                             const BarOptions& options);
-/// Thermal expansion and sag of the options, stated in bar.toml.
+/// Sets the thermal expansion and the sag that bar.toml states, from the options.
 void set_properties(mfb::StatedBar& bar, const mfb::ProbingOptions& stated);
 
-/// "NAME=VALUE" in two. Usage without "=".
+/// The two parts of "NAME=VALUE". Usage if there is no "=".
 struct NameAndValue {
   std::string name, value;
 };
@@ -60,10 +60,11 @@ struct NameAndValue {
 struct NamedText {
   std::string name, text;
 };
-/// Creates the folder and writes the files into it. Io.
+/// Creates the folder and writes the files into it. Error Io.
 [[nodiscard]] Result<void> write_folder(const std::string& folder,
                                         const std::vector<NamedText>& files);
-/// An error of an option, whose value is no touch or measurement of the plan.
+/// Converts an error to Usage: the value of an option does not name a touch or measurement of the
+/// plan.
 [[nodiscard]] Error as_usage(Error error);
 
 }  // namespace abbe::sim

@@ -1,7 +1,7 @@
 #pragma once
-/// Polls the encoder bus on a thread of its own. Real encoders answer a SYNC independently of all
-/// other devices. On a thread common to all devices the answer would wait until a burst of the
-/// tracker is computed: with sanitizers or on a busy computer several SYNC periods.
+/// Polls the encoder bus on a separate thread. Real encoders answer a SYNC independently of all
+/// other devices. If all devices shared one thread, the answer would wait until a burst of the
+/// tracker is computed, which takes several SYNC periods with sanitizers or on a busy computer.
 
 #include <future>
 

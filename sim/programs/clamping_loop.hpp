@@ -1,5 +1,5 @@
 #pragma once
-/// The loop of `abbe-sim bar --config`: a measuring machine on its port, and one thing after the
+/// The loop of `abbe-sim bar --config`: simulates a measuring machine with one artefact after the
 /// other on its table, until SIGINT or SIGTERM.
 
 #include <string>
@@ -9,15 +9,15 @@
 
 namespace abbe::sim {
 
-/// What lies on the table until the operator puts the next thing there.
+/// An artefact on the table, until the operator replaces it by the next one.
 struct OnTable {
-  std::string name;  ///< "N1"
+  std::string name;  ///< name of the artefact: "N1"
   MeasuringMachine machine;
 };
 
 struct ClampingLoop {
   std::string ports_file;  ///< written when the machine listens; empty: none
-  double speed = 1.0;      ///< simulated seconds per second
+  double speed = 1.0;      ///< simulated seconds per real second
 };
 
 /// Opens the simulation, whose measuring machine has the first of `things` on its table; every

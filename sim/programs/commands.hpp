@@ -30,7 +30,7 @@ struct Subcommand {
 [[nodiscard]] Subcommand add_bar(CLI::App& app);
 [[nodiscard]] Subcommand add_set(CLI::App& app);
 
-/// The files of `abbe-sim mfb` with the default of every option. An exit code.
+/// Writes the files of `abbe-sim mfb`, with the default of every option. Returns an exit code.
 [[nodiscard]] int write_bar_set(const std::string& folder);
 
 /// Prints "abbe-sim: " and the text of the error to stderr; returns the exit code of the error.

@@ -19,7 +19,7 @@ namespace {
 
 struct EvemuOptions {
   SetupChoices choices;
-  std::size_t points_per_ball = 0, points_per_block = 0;  // 0: the value of the file
+  std::size_t points_per_ball = 0, points_per_block = 0;  // 0: the value in the file
   std::vector<std::size_t> missed, doubled, stray;
   std::string ports_file, calibrator_out, truth_out, reference_out;
   double u_reference_um = 5.0;

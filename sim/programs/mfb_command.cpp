@@ -1,5 +1,5 @@
-/// abbe-sim mfb: a simulated machine measures a Multi-Feature Bar; the files for `abbe identify
-/// mfb`, and the true errors.
+/// abbe-sim mfb: a simulated machine measures a Multi-Feature Bar. The command writes the files for
+/// `abbe identify mfb`, and the true errors.
 
 #include <fmt/format.h>
 
@@ -44,7 +44,8 @@ const std::map<std::string, mfb::PlanKind> kPlans{{"17", mfb::PlanKind::Full},
 const std::map<std::string, mfb::Passes> kPasses{{"pairs", mfb::Passes::Pairs},
                                                  {"forward", mfb::Passes::ForwardAlone}};
 
-/// Tables that are smooth beyond the travel, too: the outer touches are there.
+/// A machine whose error tables are smooth also beyond the travel, because the outer touches are
+/// there.
 TruthMachine cube_machine(const MfbOptions& options) {
   TruthMachine machine;
   for (const Axis axis : kAxes) machine.axis(axis).range = {0.0, options.length_m(), 0.0};
@@ -70,7 +71,7 @@ std::string sim_toml(const MfbOptions& options) {
       options.seed);
 }
 
-/// Scales and probe on a counter card: the same touches as in points.csv.
+/// Simulates scales and probe on a counter card, with the same touches as in points.csv.
 int run_live(const MfbOptions& options, const TruthMachine& machine, mfb::ProbedBar probed) {
   const std::size_t from = std::min(options.live.from, probed.touches.size());
   probed.touches.erase(probed.touches.begin(),

@@ -36,7 +36,7 @@ void read_axes(Section root, TruthMachine& truth) {
 }
 
 void read_linear_scale(Section& section, EncoderNodeOptions& node) {
-  double step_nm = 1.0;  // as abbed reads the file
+  double step_nm = 1.0;  // default value, as abbed reads the file
   section.get("step_nm", step_nm, kPlain, {1.0, 1e9});
   section.get("offset_mm", node.offset, kMilli, kAnyNumber);
   node.step_nm = static_cast<std::uint32_t>(step_nm);
@@ -81,7 +81,8 @@ std::optional<EncoderNodeOptions> read_encoder_node(Section root, Section& secti
   return node;
 }
 
-/// Those of X, Y and Z, and one on each rotary axis: they exist without an entry in the file.
+/// Adds the nodes of X, Y and Z, and one for each rotary axis. They exist without an entry in the
+/// file.
 void add_rotary_nodes(Section root, std::vector<EncoderNodeOptions>& nodes) {
   for (const std::string& name : root.child("axes").keys()) {
     if (!is_rotary(root, name)) continue;
@@ -104,7 +105,8 @@ void read_encoder_nodes(Section root, Section& encoder, std::vector<EncoderNodeO
   nodes = seen;
 }
 
-/// With sync = "external" the control of the machine sends the SYNC; the simulator does it.
+/// Reads the SYNC. With sync = "external" the control of the machine sends it; here the simulator
+/// does.
 void read_sync(Section& encoder, SimulationSetup& simulation) {
   std::string sync;
   encoder.get("sync", sync);

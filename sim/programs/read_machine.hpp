@@ -1,5 +1,5 @@
 #pragma once
-/// The tables that the daemon reads too. Keys that only the daemon uses are ignored.
+/// Reads the tables that the daemon also reads. Keys that only the daemon uses are ignored.
 
 #include "setup_draft.hpp"
 #include "toml_file.hpp"

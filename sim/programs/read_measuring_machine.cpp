@@ -33,8 +33,7 @@ void read_features(Section root, MeasuringMachine& machine) {
 void read_cmm(Section section, SimulationSetup& simulation) {
   if (!section.present()) return;
   IppDmeOptions machine;
-  // A measuring machine has a volume of its own: travels and errors of the machine tool do not
-  // apply.
+  // A measuring machine has its own volume; travels and errors of the machine tool do not apply.
   machine.machine.truth = {};
   std::string tool;
   if (section.get("tool", tool)) machine.tools.push_back(tool);

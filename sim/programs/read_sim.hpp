@@ -1,5 +1,5 @@
 #pragma once
-/// [sim] and all tables below it.
+/// Reads [sim] and all tables below it.
 
 #include <string>
 

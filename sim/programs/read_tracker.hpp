@@ -8,11 +8,11 @@
 namespace abbe::sim {
 
 void read_sim_tracker(Section section, SetupDraft& draft);
-/// The nests of [[tracker.nest]] in the machine file: they are where they are configured, unless
-/// [[sim.tracker.nest]] gives other positions.
+/// Reads the nests of [[tracker.nest]] in the machine file. They are at their configured positions,
+/// unless [[sim.tracker.nest]] gives other positions.
 void read_nests(Section& tracker, SimulationSetup& simulation);
 
-/// `protocol = "lines"` with its keys, in [tracker] of the machine file or in [sim.tracker].
+/// Reads `protocol = "lines"` with its keys, in [tracker] of the machine file or in [sim.tracker].
 void read_lines(Section& tracker, SimulationSetup& simulation);
 
 }  // namespace abbe::sim

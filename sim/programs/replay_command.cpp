@@ -46,11 +46,12 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
   return {};
 }
 
-/// Reads from the recorded configuration the serial numbers that the daemon expected of its cards.
+/// Reads, from the recorded configuration, the serial numbers that the daemon expected of its
+/// cards.
 void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
   const auto root = sections::parse_bounded(configuration, "recorded configuration");
-  // The configuration may be of a daemon version that abbe-sim cannot read: the bytes are replayed
-  // nevertheless.
+  // Another version of the daemon may have written a configuration that abbe-sim cannot read. The
+  // bytes are replayed nevertheless.
   if (!root) return;
   for (const auto& [table, usual] :
        {std::pair{"counter_card", "counter_card"}, std::pair{"reference", "reference_card"}}) {
@@ -60,7 +61,7 @@ void read_serials(const std::string& configuration, std::map<std::string, std::s
   }
 }
 
-/// Reads from the recorded configuration how the lines of the tracker came.
+/// Reads, from the recorded configuration, how the daemon received the lines of the tracker.
 void read_transport(const std::string& configuration, std::map<std::string, LineOutput>& lines) {
   const auto root = sections::parse_bounded(configuration, "recorded configuration");
   if (!root) return;

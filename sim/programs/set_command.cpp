@@ -1,4 +1,4 @@
-/// abbe-sim set: files of a simulated measurement that fit each other, and the commands that use
+/// abbe-sim set: writes matching files of a simulated measurement, and prints the commands that use
 /// them.
 
 #include <fmt/format.h>
@@ -47,7 +47,7 @@ TruthMachine demo_machine() {
   return machine;
 }
 
-/// path.csv of the demo, stretched to the travel of `machine`.
+/// The path.csv of the demo, scaled to the travel of `machine`.
 std::vector<PathVertex> demo_path(const TruthMachine& machine) {
   auto vertices = parse_path_csv(set_file("path.csv"), "path.csv").value();
   const TruthMachine demo = demo_machine();
@@ -70,7 +70,8 @@ std::string path_csv(const std::vector<PathVertex>& vertices) {
   return text;
 }
 
-/// The points of a laser tracker during a drive along the path, 2 s of standstill before and after.
+/// The points of a laser tracker during a run along the path, with a standstill of 2 s before and
+/// after.
 Result<std::string> tracker_csv(const TruthMachine& machine,
                                 const std::vector<PathVertex>& vertices,
                                 const TrackerModel& tracker,
@@ -134,8 +135,8 @@ Result<Files> on_the_fly_files() {
                {"truth.csv", format_truth_csv(machine)}};
 }
 
-/// The machine with the travel of the smallest box that contains all balls, 1 mm larger: the centre
-/// of ball 1, where V is zero, comes from touches.
+/// The machine with a smaller travel: the smallest box that contains all balls, enlarged by 1 mm.
+/// The reason: the touches give the centre of ball 1, where V is zero.
 TruthMachine within_balls(TruthMachine machine, const BallArray& array) {
   for (const Axis axis : kAxes) {
     AxisRange& range = machine.axis(axis).range;
@@ -162,7 +163,8 @@ Result<Files> ball_array_files() {
                {"verification.csv", verification_csv(within_balls(machine, array))}};
 }
 
-/// A machine whose travel holds the ball array, and a laser tracker at two places.
+/// The files of a machine whose travel contains the ball array, and of a laser tracker at two
+/// places.
 Result<Files> joint_files() {
   TruthMachine machine = weak_stiffness_machine();
   machine.order = {Axis::X, Axis::Y, Axis::Z};

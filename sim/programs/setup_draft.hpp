@@ -1,6 +1,6 @@
 #pragma once
-/// The content of the files, before the truth is made from it. Each group of tables has its own
-/// reader, which fills its part.
+/// The content of the files, before the true machine is made from it. Each group of tables has its
+/// own reader, which sets its part.
 
 #include <cstdint>
 #include <string>

@@ -12,7 +12,7 @@
 namespace abbe::sim {
 namespace {
 
-/// Adds a tracker, and an encoder on each axis: these devices exist without an entry in the files.
+/// Adds a tracker, and an encoder for each axis. These devices exist without an entry in the files.
 void add_usual_devices(SimulationSetup& simulation) {
   simulation.tracker.emplace();
   simulation.bus.emplace();
@@ -87,7 +87,7 @@ Result<void> make_truth(SetupDraft& draft) {
   return {};
 }
 
-/// With a control the machine stands in the middle of its travel until the first position arrives.
+/// With a control, the machine stands in the middle of its travel until the first position arrives.
 void stand_in_the_middle(SimulationSetup& simulation) {
   Eigen::Vector3d middle_m;
   for (const Axis axis : kAxes) {
@@ -97,7 +97,8 @@ void stand_in_the_middle(SimulationSetup& simulation) {
   simulation.path.vertices = {{middle_m}};
 }
 
-/// A machine that follows a control has its motion from there, in real time.
+/// Checks the setup of a machine that follows a control: its motion comes from the control, in real
+/// time.
 Result<void> check_control(const SetupDraft& draft) {
   const std::string file = "[sim.control]";
   if (!draft.path_file.empty())
@@ -137,7 +138,7 @@ void share_seed_and_speed(SetupDraft& draft) {
     card.seed = static_cast<std::uint64_t>(draft.seed);
 }
 
-/// The tracker visits the nests, if there are any, while the machine waits.
+/// Lets the beam of the tracker visit the nests, if there are any, while the machine waits.
 void make_nest_visits(SetupDraft& draft) {
   SimulationSetup& simulation = draft.setup.simulation;
   TrackerModel& tracker = simulation.tracker->model;

@@ -1,6 +1,6 @@
 #pragma once
-/// The TOML files of abbe-sim: the reader of their tables, as names of this namespace, and the
-/// bounds that examples/sim.toml states.
+/// Reads the TOML files of abbe-sim: makes the reader of their tables known in this namespace, and
+/// defines the bounds that examples/sim.toml states.
 
 #include <cstdint>
 #include <functional>
@@ -23,7 +23,7 @@ using sections::Section;
 using sections::Unit;
 
 inline constexpr Unit kMega{1e-6};
-inline constexpr Unit kPerMinute{60e3};  ///< of mm, for m/s
+inline constexpr Unit kPerMinute{60e3};  ///< unit mm/min, for m/s
 inline constexpr Bounds kAnyNumber{-1e12, 1e12};
 inline constexpr Bounds kPositiveNumber{1e-12, 1e12};
 inline constexpr Bounds kNotNegativeNumber{0.0, 1e12};

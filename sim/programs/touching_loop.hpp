@@ -11,7 +11,7 @@ namespace abbe::sim {
 struct TouchingLoop {
   std::string ports_file;        ///< written when the card listens; empty: none
   bool start_on_signal = false;  ///< the motion starts on SIGUSR1
-  double speed = 1.0;            ///< simulated seconds per second
+  double speed = 1.0;            ///< simulated seconds per real second
 };
 
 /// Opens the simulation, prints `what` ("144 touches"), and runs it. Returns the exit code.

@@ -1,5 +1,5 @@
-/// abbe-sim truth: V of the simulated machine at points, to compare an identified model with.
-/// abbe-sim machine: its 21 errors as a table.
+/// abbe-sim truth: prints V of the simulated machine at points, for a comparison with an identified
+/// model. abbe-sim machine: prints its 21 errors as a table.
 
 #include <fmt/format.h>
 
@@ -21,7 +21,7 @@ struct TruthOptions {
   SetupChoices choices;
   std::string points_file;
   std::vector<std::size_t> grid;
-  std::vector<double> tool_mm;  // empty: the target of the machine file
+  std::vector<double> tool_mm;  // empty: the target offset of the machine file
   std::string out = "-";
 };
 
@@ -47,7 +47,7 @@ std::vector<Eigen::Vector3d> grid_points(const TruthMachine& truth,
 Result<std::vector<Eigen::Vector3d>> file_points(const std::string& file) {
   const auto text = read_file(file);
   ABBE_TRY(text);
-  const auto rows = parse_path_csv(*text, file);  // the same columns
+  const auto rows = parse_path_csv(*text, file);  // path.csv has the same columns
   ABBE_TRY(rows);
   std::vector<Eigen::Vector3d> points;
   for (const PathVertex& row : *rows) points.push_back(row.q_m);

@@ -1,5 +1,5 @@
 #pragma once
-/// verification.csv of a simulated machine, for `abbe verify`.
+/// The file verification.csv of a simulated machine, for `abbe verify`.
 
 #include <string>
 
@@ -7,8 +7,8 @@
 
 namespace abbe::sim {
 
-/// Readings on a grid over the travel, and the true place of the target there, in machine
-/// coordinates.
+/// The text of the file: readings on a grid over the travel, and the true position of the target
+/// there, in machine coordinates.
 [[nodiscard]] std::string verification_csv(const TruthMachine& machine);
 
 }  // namespace abbe::sim

@@ -11,14 +11,16 @@ namespace abbe::sim {
 Result<ControlPort> ControlPort::open(std::uint16_t port) {
   auto socket = bind_udp(port);
   ABBE_TRY(socket);
-  // For the records of a second, which a sender that was stopped sends at once.
+  // The buffer is large enough for the records of a second, which a sender that was stopped sends
+  // at once.
   constexpr int kBytes = 1 << 20;
   ::setsockopt(socket->get(), SOL_SOCKET, SO_RCVBUF, &kBytes, sizeof kBytes);
   return ControlPort(std::move(*socket));
 }
 
 void ControlPort::poll(HostTime now) {
-  constexpr int kMost = 1000;  // a sender that never pauses must not stop the simulation
+  // limit, so that a sender that never pauses does not block the simulation
+  constexpr int kMost = 1000;
   // One byte more than a record, so that a longer datagram is not taken for one.
   std::array<std::byte, protocol::kPositionRecordBytes + 1> buffer{};
   for (int i = 0; i < kMost; ++i) {

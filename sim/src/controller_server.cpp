@@ -51,7 +51,7 @@ void ControllerServer<Controller>::accept_clients(HostTime now) {
     Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
     device_->advance(now);
-    if (!device_->accepts()) continue;  // restarting: the connection is closed at once
+    if (!device_->accepts()) continue;  // the controller restarts: the connection is closed at once
     if (client_) read(now);             // detects that the client has disconnected
     if (client_) {
       refuse_client<Controller>(accepted);

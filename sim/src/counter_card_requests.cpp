@@ -1,4 +1,4 @@
-// The card's answers on endpoint 0.
+// Answers of the card on endpoint 0.
 #include <algorithm>
 #include <utility>
 

@@ -1,4 +1,4 @@
-// The three protocols of RecordedDialogue.
+// The request formats of the three protocols of RecordedDialogue.
 #include <algorithm>
 #include <array>
 #include <string_view>

@@ -158,7 +158,7 @@ void EncoderBus::inject(const Fault& fault, HostTime now) {
         all_clears_.push_back({until, node.node()});
         break;
       default:
-        break;  // not a fault of an encoder
+        break;  // this is not a fault of an encoder
     }
   }
 

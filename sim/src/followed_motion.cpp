@@ -7,7 +7,8 @@ namespace {
 
 constexpr std::chrono::nanoseconds kKept = std::chrono::seconds{2};
 constexpr std::chrono::nanoseconds kBeyondNewest = std::chrono::milliseconds{20};
-// A record whose time differs by more from its arrival is of a control that started again.
+// If the time of a record differs from its arrival by more than this, the control has started
+// again.
 constexpr std::chrono::nanoseconds kMostDelay = std::chrono::seconds{1};
 constexpr double kStands_m = 1e-12;
 constexpr std::int64_t kPerGrowth = 10'000;  // the offset grows by 1 / kPerGrowth of the time
@@ -33,7 +34,7 @@ bool FollowedMotion::continues(const protocol::PositionRecord& record, std::int6
   return late > -kMostDelay && late < kMostDelay;
 }
 
-// Called for the first record, too.
+// Also called for the first record.
 void FollowedMotion::restart(const protocol::PositionRecord& record) {
   if (first_ && homed_) ++counts_.restarts;
   places_.clear();
@@ -50,7 +51,7 @@ void FollowedMotion::add(const protocol::PositionRecord& record, HostTime arriva
     return;
   }
 
-  // The difference of two numbers of 32 bits is right also where the number begins again at 0.
+  // The difference of two numbers of 32 bits is also correct if the number has wrapped to 0.
   const auto step = static_cast<std::int32_t>(record.cycle - newest_number_);
   const std::int64_t cycle = newest_cycle_ + step;
   const bool goes_on = homed_ && continues(record, cycle, arrival);

@@ -42,7 +42,7 @@ Eigen::Vector3d place_m(const std::string& arguments, Eigen::Vector3d here_m) {
   return here_m;
 }
 
-/// True for a place that the machine can report: within 1e12 mm of its zero.
+/// True if the machine can report the position: all coordinates are within 1e12 mm of zero.
 bool finite_place(const std::string& arguments) {
   constexpr double kFarthest_mm = 1e12;
   const auto point = ippdme::parse_point(arguments);
@@ -97,7 +97,7 @@ std::string IppDmeDevice::place(const std::vector<std::string>& names,
     if (name == "IJK") {
       text += "IJK(0,0,1)";
     } else {
-      // has a value: see finite_place()
+      // number_text() succeeds, see finite_place()
       text +=
           name + "(" + ippdme::number_text(kMillimetresPerMetre * p_m[name[0] - 'X']).value() + ")";
     }

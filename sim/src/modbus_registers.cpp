@@ -71,7 +71,7 @@ bool is_broken(const BrokenInput& broken, std::size_t input) {
   return broken.input == 0 || broken.input == input + 1;
 }
 
-/// The reading `right_C` of an input as its fault changes it.
+/// The reading of an input with a fault; `right_C` is the reading without the fault.
 double broken_reading_C(const BrokenInput& fault, const EnvironmentModel& environment,
                         std::size_t input, nanoseconds t, double right_C) {
   constexpr std::int64_t kSpikePeriod_s = 5;
@@ -100,7 +100,7 @@ double broken_reading_C(const BrokenInput& fault, const EnvironmentModel& enviro
 
 std::uint16_t register_of_input(const EnvironmentModel& environment, std::size_t input,
                                 nanoseconds t, const std::vector<BrokenInput>& broken) {
-  // Saturated, as in the module.
+  // The reading is limited, as in the real module.
   const double reading_C =
       std::clamp(reading_of_input(environment, input, t, broken), -3276.0, 3276.0);
   std::uint16_t value = tenths(reading_C);

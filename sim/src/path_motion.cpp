@@ -24,7 +24,7 @@ Result<void> check_plan(const PathPlan& plan) {
   return {};
 }
 
-/// The vertices without those at which the machine already is.
+/// The vertices of the plan, without those at which the machine already is.
 std::vector<PathVertex> vertices_reached(const PathPlan& plan) {
   std::vector<PathVertex> reached{plan.vertices.front()};
   for (const PathVertex& vertex : plan.vertices)

@@ -11,7 +11,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kBeat = 100ms;  // between heartbeats while nothing is replayed
+constexpr auto kBeat = 100ms;  // interval between heartbeats while nothing is replayed
 constexpr std::uint32_t kFunction = 0x780;
 constexpr std::uint32_t kNode = 0x07F;
 
@@ -42,7 +42,8 @@ RecordedBus::RecordedBus(std::unique_ptr<CanPort> port, const RecordedDevice& de
     if (!view) continue;
     for (can::CanFrame frame; view->next(frame);) take(frame, block.to_device, block.time);
   }
-  if (external()) state_ = can::NodeState::Operational;  // started by the machine's control
+  // the machine's control has started the nodes
+  if (external()) state_ = can::NodeState::Operational;
 }
 
 void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time) {
@@ -126,7 +127,7 @@ void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
     return;
   state_ = can::NodeState::PreOperational;
   if (timeline_.running() && next_unsolicited_ < unsolicited_.size())
-    return;  // the recorded boot-up messages follow at their time
+    return;  // the recorded boot-up messages follow at their recorded time
 
   for (const can::NodeId node : nodes_) {
     if (nmt->node != can::kAllNodes && nmt->node != node) continue;

@@ -102,7 +102,7 @@ ControlAnswer RecordedCard::answer(const usb::Setup& setup, HostTime now) {
   return resuming_ ? unrecorded(setup, now) : next_answer(setup, now);
 }
 
-/// Selects the next recorded connection; after the last one the first again.
+/// Selects the next recorded connection. After the last one, the first follows again.
 void RecordedCard::open() {
   connection_ = connection_ ? (*connection_ + 1) % connections_.size() : 0;
   next_ = connections_[*connection_].begins;

@@ -9,7 +9,8 @@ RecordedDialogue::RecordedDialogue(const RecordedDevice& device, const DialogueW
     : wire_(wire), serial_(device.kind == RecordedKind::ModbusRtu) {
   for (const RecordedBlock& block : device.blocks) take(block);
   if (connections_.empty()) connections_.emplace_back();
-  // A last request without an answer is removed: the recording may have ended before the answer.
+  // A last request without an answer is removed, because the recording may have ended before the
+  // answer.
   auto& last = connections_.back().exchanges;
   if (!last.empty() && last.back().answer.empty()) last.pop_back();
   index();

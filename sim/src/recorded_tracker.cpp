@@ -95,7 +95,7 @@ void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byt
 
   // A recording that began during a session may contain an answer, but not its command.
   if (exchange == exchanges.end()) exchange = exchanges.insert(exchange, {.asked = time});
-  if (command == kReflectors) {  // the only command with several answers: one per reflector
+  if (command == kReflectors) {  // this command has several answers, one per reflector
     const auto first = emscon::decode_answer(packet);
     const auto* reflectors = first ? std::get_if<emscon::ReflectorsAnswer>(&*first) : nullptr;
     if (reflectors != nullptr)

@@ -102,7 +102,7 @@ bool is_emscon(std::span<const std::byte> bytes) {
   return static_cast<std::size_t>(size) == bytes.size();
 }
 
-/// abbe sends nothing to a program that prints lines.
+/// True for blocks of a program that sends lines of text: abbe sends nothing to it.
 bool are_lines(std::span<const RecordedBlock> blocks) {
   constexpr auto is_text = [](std::byte b) {
     return (b >= std::byte{' '} && b <= std::byte{'~'}) || b == std::byte{'\t'} ||

@@ -205,7 +205,8 @@ class Maker {
                           fmt::format("abbe-sim-{}-{}", ::getpid(), device.name);
     return chosen(setup_.links, device.name, anywhere.string());
   }
-  /// The recorded port if the lines go to a daemon: it receives there again.
+  /// If the lines went to a port of the daemon, the recorded port is used, because the daemon
+  /// receives there again.
   [[nodiscard]] Made lines(const RecordedDevice& device) const {
     LineOutput output = chosen(setup_.lines, device.name, LineOutput{});
     if (output.transport == LineTransport::Serial)

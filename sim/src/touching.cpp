@@ -14,9 +14,10 @@ using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
 constexpr double kAbove_m = 10e-3;      // clearance of travelling moves above a feature
-constexpr double kStrayAway_m = 40e-3;  // exceeds every tolerance
+constexpr double kStrayAway_m = 40e-3;  // larger than every tolerance
 
-/// A spiral from the pole to the equator: successive points are close, their density is uniform.
+/// A direction on a spiral from the pole to the equator: successive points are close together, and
+/// their density is uniform.
 Vector3d direction_on_ball(std::size_t point, std::size_t points) {
   const double golden_rad = std::numbers::pi * (3.0 - std::sqrt(5.0));
   const double z =
@@ -26,7 +27,7 @@ Vector3d direction_on_ball(std::size_t point, std::size_t points) {
   return {across * std::cos(angle_rad), across * std::sin(angle_rad), z};
 }
 
-/// Points in rows of alternating direction, divided evenly among the rows.
+/// A point in rows of alternating direction; the points are divided evenly among the rows.
 Vector3d place_on_face(const ArrayFace& face, std::size_t point, std::size_t points) {
   const auto rows = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(points))));
   const std::size_t columns = (points + rows - 1) / rows;
@@ -46,7 +47,7 @@ class Planner {
       : truth_(truth), array_(array), options_(options) {
     program_.path.feed_m_per_s = options.travel_m_per_s;
     program_.path.acceleration_m_per_s2 = options.acceleration_m_per_s2;
-    program_.path.vertices.push_back({});  // reading 0, where the counters are set up
+    program_.path.vertices.push_back({});  // reading 0, at which the counters are set up
   }
 
   void ball(const Isometry3d& T_machine_array, const ArrayBall& ball) {
@@ -139,8 +140,9 @@ double contact_s(const ProbingMove& move, const TruthMachine& truth, const PathM
 }  // namespace
 
 Vector3d reading_at_m(const TruthMachine& truth, const Vector3d& place_m) {
-  constexpr int kMostSteps = 200;  // twenty suffice for slopes of V near 0.2
-  // A step below this ends the iteration. A step of 0 is rarely reached: the last bit alternates.
+  constexpr int kMostSteps = 200;  // about twenty steps are enough for slopes of V near 0.2
+  // A step below this ends the iteration. The step seldom becomes exactly 0, because the last bit
+  // alternates.
   constexpr double kNothing_m = 1e-14;
   Vector3d q_m = place_m;
   for (int i = 0; i < kMostSteps; ++i) {

@@ -115,8 +115,8 @@ emscon::Status TrackerDevice::outcome(const emscon::Request& request, HostTime a
     return initialised_ ? move_beam(at) : Status::TrackerNotInitialized;
   }
 
-  // Orientation, search and long parameters are stored and have no effect. The packet rate of
-  // bursts, for example, is that of real controllers, which does not depend on the requested rate.
+  // Orientation, search and long parameters are stored and have no effect. For example, the packet
+  // rate is that of real controllers, which does not depend on the requested rate.
   return Status::Ok;
 }
 

@@ -356,7 +356,7 @@ void TrackerDevice::inject(const Fault& fault, HostTime now) {
       out_.insert(out_.end(), 64, std::byte{0xA5});
       return;
     default:
-      return;  // not a fault of a tracker
+      return;  // this is not a fault of a tracker
   }
 }
 

@@ -35,7 +35,7 @@ std::optional<Place> place_of(std::string_view name) {
   return Place{*axis, motion};
 }
 
-/// All names that column "name" may hold.
+/// All allowed names in column "name".
 std::vector<std::string> error_names() {
   std::vector<std::string> names(kSquareness.begin(), kSquareness.end());
   for (const Axis axis : kAxes) {

@@ -2,7 +2,7 @@
 
 namespace abbe::sim {
 
-// Files and messages are in millimetres.
+// Files and messages use millimetres.
 inline constexpr double kMmPerM = 1e3;
 inline constexpr double kMPerMm = 1e-3;
 

@@ -67,7 +67,7 @@ void UsbipServer::accept_clients() {
   for (;;) {
     Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
-    if (!plugged_ || client_) continue;  // closed at once
+    if (!plugged_ || client_) continue;  // the new connection is closed at once
     const int on = 1;
     setsockopt(accepted.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     client_ = std::move(accepted);
@@ -89,7 +89,7 @@ void UsbipServer::read(HostTime now) {
     }
   }
 
-  accept_clients();  // a client may be waiting since the previous one disconnected
+  accept_clients();  // a client may have been waiting since the previous one disconnected
 }
 
 void UsbipServer::process_incoming(HostTime now) {
@@ -296,7 +296,7 @@ void UsbipServer::inject(const Fault& fault, HostTime now) {
       break;
     }
     default:
-      break;  // not a fault of a counter card
+      break;  // this is not a fault of a counter card
   }
 
   write();

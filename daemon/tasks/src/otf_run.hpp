@@ -29,8 +29,8 @@ struct MachineAndPath {
 /// Replaces settings of the configuration by the options of the command, except --smoothness-um.
 void apply(const IdentifyOtfArguments& arguments, Config& config);
 
-/// Refuses the model of a run unless the gate accepts it otherwise: the noise of the points
-/// contradicts the stated place of the tracker.
+/// Adds a refusal to the verdict if the noise of the points contradicts the place of the tracker
+/// that the points state. The gate may be configured to accept such a model.
 void judge_beams(const TrackerFile& points, const calib::otf::Observations& observations,
                  const calib::otf::Solution& solution, const GateConfig& gate,
                  calib::Verdict& verdict);

@@ -14,8 +14,8 @@ namespace {
 /// Points measured before a beam break may arrive after its report. The beam has returned at the
 /// first point after a gap of at least this duration, and of at least three point separations.
 constexpr std::chrono::milliseconds kShortestBreak{20};
-/// A point that arrives later than this has a wrong time: neither a controller nor a stalled
-/// network delays points by a minute.
+/// Longest delay of a point, for example by a stalled network; a controller stores points for less
+/// time. A point that would be later than this has a wrong time.
 constexpr std::chrono::minutes kLongestDelay{1};
 
 }  // namespace

@@ -24,7 +24,7 @@ std::size_t first_at_position(std::span<const Measurement> plan, std::size_t m) 
   return static_cast<std::size_t>(std::find_if(plan.begin(), plan.end(), same) - plan.begin());
 }
 
-/// T_machine_bar of the bar as clamped, and not turned.
+/// T_machine_bar of the bar as clamped, for a bar that is not turned.
 Isometry3d pose_of(const Measurement& m, double length_m, const ProbingOptions& options,
                    std::uint64_t position) {
   const Numbers draw{options.seed, NoiseStream::BarPose, position};
@@ -41,7 +41,7 @@ Isometry3d pose_of(const Measurement& m, double length_m, const ProbingOptions& 
   return T_machine_bar;
 }
 
-/// T_planned_bar of a bar that lies turned about an axis through its middle.
+/// T_planned_bar of a bar that is clamped turned, about an axis through its middle.
 Isometry3d turned_pose(Turned turned, double length_m) {
   constexpr double kHalfTurn_rad = 3.14159265358979323846;
   const Vector3d middle_m(0.5 * length_m, 0.0, 0.0);
@@ -98,7 +98,7 @@ Vector3d sag_at(const ClampedBar& clamped, double x_m) {
           g.z() * sag_m(*clamped.sag, height_z_m, x_m)};
 }
 
-/// Form error at the target of the feature that is nearest to `p_m`.
+/// Form error of the target of the feature that is nearest to `p_m`.
 double form_at(const ClampedBar& clamped, const Feature& feature, const Vector3d& p_m) {
   double nearest_m = std::numeric_limits<double>::infinity(), form_m = 0.0;
   for (std::size_t i = 0; i < clamped.all.size(); ++i) {
@@ -116,7 +116,7 @@ double most(const std::vector<double>& values) {
   return out;
 }
 
-/// Distances of a tip from the features of one bar, in bar axes.
+/// Computes distances of a tip from the features of one bar, in bar axes.
 class Clearance {
  public:
   Clearance(const ClampedBar& clamped, const Vector3d& tip_m, double tip_radius_m)
@@ -132,7 +132,8 @@ class Clearance {
   }
 
  private:
-  /// Place of the tip from a point of the axis: along it, and distance from it.
+  /// Position of the tip relative to an axis: the distance along the axis, and the distance from
+  /// it.
   struct FromAxis {
     double along_m, across_m;
   };
@@ -143,7 +144,7 @@ class Clearance {
   }
 
   void hole(std::size_t i) {
-    constexpr double kInside = 1.5;  // of the radius: a tip farther away is not in this hole
+    constexpr double kInside = 1.5;  // in radii; a tip farther from the axis is not in this hole
     const TrueCylinder& c = bar_.holes[i];
     const FromAxis tip = from_axis(c);
     if (std::abs(tip.along_m) > 2.0 * most(bar_.pattern.hole_levels_m)) return;
@@ -157,7 +158,7 @@ class Clearance {
       is({Kind::Rod, j, {}}, tip.across_m - c.radius_m);
   }
 
-  /// A square that is touched from outside.
+  /// Adds the distance from a square that is touched from its outer side.
   void plane(std::size_t j, Side side) {
     const TruePlane& p = bar_.planes[j][static_cast<std::size_t>(side)];
     const double half_m =
@@ -204,7 +205,8 @@ ClampedBar clamped(const TrueBar& bar, std::span<const Measurement> plan, std::s
 
 double clearance_m(const ClampedBar& clamped, const Vector3d& tip_m, double tip_radius_m) {
   const Vector3d there_m = (clamped.T_machine_planned * clamped.T_planned_bar).inverse() * tip_m;
-  // The bar is deformed at the centre of the tip as at the touched place, a tip radius away.
+  // Assumption: the bar is deformed at the centre of the tip as at the touched point, which is one
+  // tip radius away.
   const Vector3d p_m =
       there_m - clamped.displacement_m(there_m.x()) - (clamped.growth - 1.0) * there_m;
   return Clearance(clamped, p_m, tip_radius_m).nearest_m();

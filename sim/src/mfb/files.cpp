@@ -52,7 +52,7 @@ std::string sag_toml(const Sag& sag) {
       sag.density_kg_per_m3, sag.youngs_modulus_Pa / kPaPerGPa);
 }
 
-/// No uncertainty for the coordinates that define the bar frame.
+/// The vector with 0 for the coordinates that define the bar frame and have no uncertainty.
 Vector3d without_fixed(Vector3d v, std::size_t i, std::size_t holes) {
   if (i == 0) return Vector3d::Zero();
   if (i + 1 == holes) v.tail<2>().setZero();
@@ -71,7 +71,7 @@ StatedBar calibrated_bar(const TrueBar& bar, const Vector3d& u_m, std::uint64_t 
     };
     stated.O_m[i] += stated.u_m[i].cwiseProduct(Vector3d(draw(0), draw(1), draw(2)));
   }
-  // Rounding errors of the frame, which would not be exactly 0 in the file.
+  // These values are only rounding errors of the frame. They must be exactly 0 in the file.
   stated.O_m.front().setZero();
   stated.O_m.back().tail<2>().setZero();
   return stated;

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kStrayAway_m = 40e-3;  // exceeds every tolerance
+constexpr double kStrayAway_m = 40e-3;  // larger than every tolerance
 
 /// One approach: a leg of the path, and the reading at which the probe triggers on it.
 struct Approach {
@@ -26,7 +26,7 @@ class Programmer {
     path_.feed_m_per_s = options.travel_m_per_s;
     path_.acceleration_m_per_s2 = options.acceleration_m_per_s2;
     path_.dwell_s = 0.0;
-    path_.vertices.push_back({});  // reading 0, where the counters are set up
+    path_.vertices.push_back({});  // reading 0, at which the counters are set up
   }
 
   void touch(const Touch& touch) {
@@ -50,7 +50,7 @@ class Programmer {
     drive_to(before_m, options_.retract_m_per_s);
   }
 
-  /// No leg if the machine is already there.
+  /// Adds a leg to `q_m`; no leg if the machine is already there.
   void drive_to(const Vector3d& q_m, double feed_m_per_s = 0.0) {
     if (path_.vertices.back().q_m != q_m) path_.vertices.push_back({q_m, feed_m_per_s});
   }

@@ -7,7 +7,8 @@
 
 namespace abbe::sim::mfb {
 
-/// Random numbers of one thing (pose, touch, ...): the n-th number of the `index`-th one.
+/// Random numbers of one object (pose, touch, ...): the n-th number of the object with number
+/// `index`.
 struct Numbers {
   std::uint64_t seed;
   NoiseStream stream;

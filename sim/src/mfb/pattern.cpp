@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
-/// Collects the targets of one bar after the other feature.
+/// Collects the targets of one bar, feature by feature.
 class TargetList {
  public:
   explicit TargetList(const Pattern& pattern) : pattern_(pattern) {}
@@ -70,7 +70,8 @@ class TargetList {
 
 Pattern reference_pattern(std::size_t holes, double pitch_m) {
   constexpr double kShift_m = 1e-3;
-  // In a bar of 7 holes, holes 3 and 5 read the same from both ends.
+  // In a bar of 7 holes, hole 5 counted from one end is hole 3 from the other end; so 3 and 4 are
+  // used.
   const std::size_t second = holes == 7 ? 3 : 4;
   Pattern pattern;
   for (std::size_t i = 0; i < holes; ++i) {

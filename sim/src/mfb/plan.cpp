@@ -14,7 +14,7 @@ constexpr double kStylus_m = 0.15;  // from the tool reference point down
 
 const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ();
 
-/// A tool whose tip is at `lateral` reaches beside the axis of the spindle.
+/// The tool offset of a tip that is beside the spindle axis, in the direction `lateral`.
 Vector3d tool(const Vector3d& lateral) {
   return kReach_m * lateral - kStylus_m * kZ;
 }
@@ -36,7 +36,7 @@ Measurement diagonal(std::string name, std::string position, const Vector3d& cen
   return lying(std::move(name), std::move(position), centre_mm - half_mm, bar_x, bar_z, lateral);
 }
 
-/// Parallel to X and Y. The lateral reach is -J of [Viprey 2016] Eq. 8.
+/// Measurements parallel to X and Y. The lateral reach is -J of [Viprey 2016] Eq. 8.
 std::vector<Measurement> horizontal(bool rolled) {
   const Vector3d none = Vector3d::Zero();
   std::vector<Measurement> plan{lying("X1", "P1", {0, 100, 0}, kX, kZ, none),

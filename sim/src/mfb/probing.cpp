@@ -23,7 +23,7 @@ std::size_t first_with_tool(std::span<const Measurement> plan, std::size_t m) {
   return static_cast<std::size_t>(std::find_if(plan.begin(), plan.end(), same) - plan.begin());
 }
 
-/// The feature of a turned bar that lies where `planned` should be.
+/// The feature of a turned bar that is at the place of the feature `planned`.
 Feature feature_there(const Feature& planned, Turned turned, std::size_t holes) {
   Feature f = planned;
   const std::size_t count = f.kind == Kind::Hole ? holes : holes - 1;
@@ -33,7 +33,7 @@ Feature feature_there(const Feature& planned, Turned turned, std::size_t holes) 
   return f;
 }
 
-/// One pass: everything that its touches have in common.
+/// One pass: the quantities that all its touches share.
 class PassProbing {
  public:
   PassProbing(const TruthMachine& machine, const TrueBar& bar, std::span<const Measurement> plan,
@@ -62,7 +62,7 @@ class PassProbing {
   }
 
  private:
-  /// Drift runs through a pass and its way back: times 0 to 1, 1 to 2.
+  /// Sets the drift. It continues from a pass (times 0 to 1) to its backward pass (times 1 to 2).
   void set_drift() {
     const std::size_t first = first_with_tool(plan_, m_);
     const Numbers draw{options_.seed, NoiseStream::BarPose, plan_.size() + first};
@@ -92,7 +92,7 @@ class PassProbing {
     return clamped_.T_planned_bar * (grown_m + clamped_.displacement_m(x_m));
   }
 
-  /// How far behind the contact the trigger comes, along the approach.
+  /// Distance from the contact to the trigger, along the approach.
   [[nodiscard]] double pretravel_m(const Vector3d& normal, const Numbers& draw) const {
     const Probe& probe = options_.probe;
     const double feed_m_per_s = probe.feed_m_per_s * (1.0 + probe.feed_scatter * draw.number(0));
@@ -125,7 +125,7 @@ class PassProbing {
   const ProbingOptions& options_;
   const std::vector<Target>& all_;
 
-  Vector3d drift_m_ = Vector3d::Zero();  // per pass
+  Vector3d drift_m_ = Vector3d::Zero();  // drift of this pass
   double passes_before_ = 0.0;
 };
 

@@ -53,7 +53,7 @@ Vector3d travel_of_tip(const ReversalOptions& options) {
 
 constexpr std::uint64_t kOfGauge = 1000000;  // random numbers of the whole gauge, from here on
 
-/// Random numbers of the gauge: of face i from i (4 runs + 1) on.
+/// Random numbers of the gauge; those of face i begin at number i (4 runs + 1).
 struct GaugeDraw {
   const ReversalOptions& options;
   [[nodiscard]] double number(std::uint64_t n) const {

@@ -30,20 +30,20 @@ class Draw {
   std::uint64_t next_ = 0;
 };
 
-/// 1 in the middle of the bar, 0 at hole 1 and hole N.
+/// The shape of a bow: 1 in the middle of the bar, 0 at hole 1 and hole N.
 double bow_at(const Pattern& pattern, double x_m) {
   const double u = 2.0 * x_m / pattern.length_m() - 1.0;
   return 1.0 - u * u;
 }
 
-/// Form errors of the touches of one feature, without the part that displaces, turns or inflates
-/// the feature.
+/// Form errors of the touches of one feature, without the part that would displace, rotate or
+/// enlarge the feature.
 Eigen::VectorXd form_of(std::span<const Target> touches, double sd_m, Draw& draw) {
   const auto n = static_cast<Eigen::Index>(touches.size());
   Vector3d centre_m = Vector3d::Zero();
   for (const Target& t : touches) centre_m += t.place_m / static_cast<double>(n);
 
-  constexpr double kBarSize_m = 0.01;  // gives displacements and rotations the same size
+  constexpr double kBarSize_m = 0.01;  // scales displacements and rotations to similar magnitudes
   Eigen::Matrix<double, Eigen::Dynamic, 7> seen(n, 7);
   Eigen::VectorXd form(n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -111,7 +111,7 @@ TruePlane plane_of(const std::array<Vector3d, 4>& points_m) {
   return {centre_m, normal.z() < 0.0 ? Vector3d(-normal) : normal};
 }
 
-/// Points of interest in the frame of the features, and the bar frame.
+/// The points of interest and the axes of the bar frame, in the frame of the features.
 struct Extraction {
   std::vector<Vector3d> O_m;
   Matrix3d axes = Matrix3d::Identity();  ///< x, y, z of R_MFB as columns
@@ -138,7 +138,7 @@ Extraction extract(const TrueBar& bar) {
   return found;
 }
 
-/// The same bar in its own frame R_MFB.
+/// Transforms the bar into its own frame R_MFB.
 void move_into_own_frame(TrueBar& bar) {
   const Extraction found = extract(bar);
   const Vector3d origin_m = found.O_m.front();
@@ -152,8 +152,9 @@ void move_into_own_frame(TrueBar& bar) {
     for (TruePlane& plane : pair) moved(plane.point_m, plane.normal);
 }
 
-/// How far the centre of the tip is from the nominal place, along `target.normal`, when the tip
-/// touches the cylinder: |s n + w| = distance of the centre from the axis, seen along the axis.
+/// Distance of the tip's centre from the nominal place, along `target.normal`, when the tip touches
+/// the cylinder. Equation: |s n + w| = distance of the centre from the axis, in the plane
+/// perpendicular to the axis.
 double way_to_cylinder_m(const TrueCylinder& c, const Target& target, double distance_m,
                          double expected_m) {
   const auto across = [&](const Vector3d& v) {
@@ -189,7 +190,7 @@ std::vector<Vector3d> points_of_interest_m(const TrueBar& bar) {
 Contact contact(const TrueBar& bar, const Target& target, std::size_t number, double tip_radius_m) {
   const Feature& f = target.feature;
   const Vector3d& n = target.normal;
-  double way_m = 0.0;  // from the nominal place to the centre of the tip
+  double way_m = 0.0;  // distance from the nominal place to the centre of the tip
   Vector3d surface_normal = n;
   const auto around = [&](const TrueCylinder& c, double distance_m) {
     way_m = way_to_cylinder_m(c, target, distance_m, tip_radius_m);

@@ -28,18 +28,19 @@ struct BallArray {
   double tip_radius_m = 1e-3;
 };
 
-/// The dimensions are our choice: the drawing in [Li OMM] has no numbers.
+/// A typical array. We chose its dimensions, because the drawing in [Li OMM] has no numbers.
 [[nodiscard]] BallArray reference_ball_array();
-/// T_machine_array of positions 1 to 8.
+/// T_machine_array for the positions 1 to 8.
 [[nodiscard]] std::vector<Eigen::Isometry3d> reference_positions();
 
-/// How the true array differs from its calibrator.toml. Default: 20 C and no difference.
+/// How the true array differs from its calibrator.toml. By default it has 20 C and does not differ.
 struct ArrayState {
   double temperature_C = 20.0;
   double alpha_per_K = 0.0;  ///< thermal expansion; 0: calibrator.toml has no alpha keys
   double u_alpha_per_K = 0.0;
-  double u_ball_m = 0.0;     ///< standard uncertainty of a ball centre, per coordinate
-  double u_block_rad = 0.0;  ///< of a face's direction, about each axis in its plane
+  double u_ball_m = 0.0;  ///< standard uncertainty of a ball centre, per coordinate
+  /// standard uncertainty of a face's direction, about each axis in its plane
+  double u_block_rad = 0.0;
   std::uint64_t seed = 1;
 };
 /// The true array: `stated` plus errors drawn with the uncertainties in `state`, expanded to the

@@ -28,7 +28,7 @@ struct CanPortOptions {
 
 struct ArrivedFrame {
   can::CanFrame frame;
-  std::chrono::nanoseconds age{};  ///< simulated time since the kernel received the frame
+  std::chrono::nanoseconds age{};  ///< simulated time from the arrival in the kernel until now
 };
 
 class CanPort {
@@ -52,7 +52,7 @@ class CanPort {
   [[nodiscard]] virtual bool has_listener() const = 0;
 
   [[nodiscard]] virtual int fd() const = 0;
-  [[nodiscard]] virtual std::uint16_t port() const { return 0; }  ///< UDP; 0: none
+  [[nodiscard]] virtual std::uint16_t port() const { return 0; }  ///< UDP port; 0: none
 };
 
 }  // namespace abbe::sim

@@ -1,6 +1,6 @@
 #pragma once
-/// Receives the position records of a control on UDP (loopback) for a machine that follows it. Not
-/// thread-safe; the motion is.
+/// Receives the position records of a control over UDP (loopback), for a machine that follows the
+/// control. Not thread-safe, but the motion is.
 
 #include <cstdint>
 #include <memory>
@@ -15,7 +15,7 @@ class ControlPort {
   /// Port 0: the kernel chooses. Error Io if the port is in use.
   [[nodiscard]] static Result<ControlPort> open(std::uint16_t port);
 
-  /// Reads all records that have arrived. `now`: their arrival.
+  /// Reads all records that have arrived. `now`: the time of their arrival.
   void poll(HostTime now);
   [[nodiscard]] int fd() const { return socket_.get(); }
   [[nodiscard]] std::uint16_t port() const { return port_of(socket_); }

@@ -42,7 +42,7 @@ struct ScaleSignal {
 };
 struct ClockSignal {
   double hz = 10e6;
-  double deviation_ppm = 0.0;  ///< against the host's clock
+  double deviation_ppm = 0.0;  ///< rate error relative to the host's clock
 };
 /// The card's own timer output 0, which runs after the command that starts it.
 struct TimerSignal {};
@@ -53,7 +53,8 @@ using PhaseSignal =
 
 struct CardChannel {
   PhaseSignal phases;
-  bool probe_on_index = false;  ///< else a scale's own index pulses
+  /// true: the probe is connected to the index input; false: a scale's own index pulses are
+  bool probe_on_index = false;
 };
 
 struct CounterCardOptions {
@@ -106,10 +107,10 @@ class CounterCard final : public ExportedCard {
  private:
   struct Counter {
     quad08::CounterSetup setup{.register_reading = true};
-    bool set_up = false;    ///< set up since power-on; else the counter reads 0
+    bool set_up = false;    ///< set up since power-on; otherwise the counter reads 0
     std::int64_t zero = 0;  ///< count of the signal when the counter was set up
     HostTime set_up_at{};
-    std::optional<double> last_reading;  ///< of a scale, at the previous scan
+    std::optional<double> last_reading;  ///< reading of a scale at the previous scan
     std::uint64_t latched = 0;
   };
 

@@ -28,7 +28,7 @@ struct EncoderNodeOptions {
   /// standard deviation of one reading before it is rounded to counts, m or rad
   double noise = 5e-9;
   std::uint64_t seed = 1;
-  /// from reset to boot-up message
+  /// time from reset to the boot-up message
   std::chrono::nanoseconds boot_time = std::chrono::milliseconds{200};
   /// The machine's control has configured the node: after its boot-up message it sends heartbeats
   /// and answers every SYNC.
@@ -44,7 +44,8 @@ class EncoderNode {
  public:
   /// Powers on at `now`: the boot-up message is due at once. `machine` must outlive the node.
   EncoderNode(const EncoderNodeOptions& options, const VirtualMachine& machine, HostTime now);
-  EncoderNode(const EncoderNode&) = delete;  // its SDO server refers to its dictionary
+  // not copyable, because its SDO server refers to its dictionary
+  EncoderNode(const EncoderNode&) = delete;
   EncoderNode& operator=(const EncoderNode&) = delete;
 
   void on_frame(const can::CanFrame& frame, HostTime at);

@@ -35,14 +35,15 @@ class ExportedCard {
   /// Removes and returns bytes for the host: at most `most`, oldest first.
   [[nodiscard]] virtual std::vector<std::byte> take(std::size_t most) = 0;
   [[nodiscard]] virtual std::size_t available() const = 0;
-  /// When `bytes` bytes will be available; HostTime::max() if no scan runs.
+  /// Time at which `bytes` bytes will be available; HostTime::max() if no scan runs.
   [[nodiscard]] virtual HostTime available_at(std::size_t bytes) const = 0;
   /// True while the card will make more bytes: a request of the host then waits until it can be
   /// filled.
   [[nodiscard]] virtual bool scanning() const = 0;
-  /// To be called when the host's connection has ended.
+  /// Call it when the host's connection has ended.
   virtual void host_disconnected() {}
-  /// When the connection breaks although the host did not request it; HostTime::max(): never.
+  /// Time at which the connection breaks although the host did not request it; HostTime::max():
+  /// never.
   [[nodiscard]] virtual HostTime breaks_at() const { return HostTime::max(); }
 };
 

@@ -9,7 +9,7 @@
 namespace abbe::sim {
 
 enum class FaultKind {
-  // tracker
+  // faults of a tracker
   BeamBreak,       ///< error packet and event NotReady, no points; after `duration_s` event Ready
   SpeedExceeded,   ///< points have this status at any speed
   PrismError,      ///< points have this status
@@ -21,7 +21,7 @@ enum class FaultKind {
   Weather,         ///< the air temperature rises by `value` K at once, with its events
   TrackerGarbage,  ///< bytes that are not a packet
   ReflectorAway,   ///< GoBirdBath and FindReflector find no reflector
-  // encoder
+  // faults of an encoder
   Late,        ///< frames are sent `value` s late
   Restart,     ///< the node boots again
   Emergency,   ///< EMCY with code `value`; after `duration_s` EMCY "no error"
@@ -29,13 +29,13 @@ enum class FaultKind {
   Bundled,     ///< frames are held back and sent together every `value` s, as by a tunnel
   Overflow,    ///< error frame: receive overflow of the CAN controller
   BusOff,      ///< error frame bus-off, silence, then the error frame restarted
-  // Environment devices; they also have Mute, Late and Disconnect (port or terminal closed for
-  // `duration_s`).
+  // Faults of environment devices; Mute, Late and Disconnect (port or terminal closed for
+  // `duration_s`) also exist for them.
   ModbusException,  ///< every request is answered with exception `value` (0: 6, busy)
   ModbusGarbage,    ///< bytes instead of answers
   WrongMap,         ///< every register is one address higher
   SensorsGone,      ///< the probe is unplugged, the sensor wires are broken
-  // One temperature input (`input`, 0: all) of an environment device; see BrokenInput.
+  // Faults of one temperature input (`input`, 0: all) of an environment device; see BrokenInput.
   SensorValue,       ///< reads `value` C: a power-on value, a short circuit
   SensorStuck,       ///< keeps its reading
   SensorSwapped,     ///< reads the sensor of the other input of its pair (1 and 2, 3 and 4, ...)
@@ -44,7 +44,7 @@ enum class FaultKind {
   SensorSpikes,      ///< every fifth second the reading is `value` K higher
   SensorDrift,       ///< drifts by `value` K per hour
   SensorOtherSlave,  ///< reads the values of another module: the input four places further
-  // Counter cards; they also have Mute, Stall and Disconnect.
+  // Faults of counter cards; Mute, Stall and Disconnect also exist for them.
   Unplug,       ///< removed from the bus; back after `duration_s` with all counters at zero
   CardRestart,  ///< power off and on
   Overrun,      ///< the FIFO is full: no more scans until it is reset
@@ -52,7 +52,7 @@ enum class FaultKind {
   ClockJump,    ///< the counted clock jumps by `value` counts
   UsbGarbage,   ///< bytes that are not USB/IP
   FailRequest,  ///< the next `value` control transfers fail (0: one)
-  // Measuring machines; they also have Mute and Disconnect.
+  // Faults of measuring machines; Mute and Disconnect also exist for them.
   EmergencyStop,  ///< the button is pressed; it is released after `duration_s`
   ErrorReport,    ///< an error of severity `value` that belongs to no command
   OddTag,         ///< an answer with the tag of a command that was not sent
@@ -69,7 +69,7 @@ struct Fault {
   double value = 0.0;
   /// encoder faults: CANopen node; environment faults: number of the device; 0 = all
   std::uint8_t node = 0;
-  std::uint8_t input = 0;  ///< of an environment device, from 1; 0 = all
+  std::uint8_t input = 0;  ///< input of an environment device, counted from 1; 0 = all
 };
 
 enum class FaultTarget { Tracker, Encoder, Environment, CounterCard, MeasuringMachine };

@@ -20,7 +20,7 @@ class FaultTimetable {
   [[nodiscard]] const ScheduledFault* take_due(const VirtualMachine& machine, HostTime now);
 
  private:
-  std::vector<ScheduledFault> faults_;  ///< by time
+  std::vector<ScheduledFault> faults_;  ///< ordered by time
   std::size_t next_ = 0;
 };
 

@@ -4,9 +4,10 @@
 ///
 /// The time of a record follows from the number of its cycle: cycle x period + offset. The offset
 /// is the smallest difference between arrival and cycle x period, so that a record that arrives
-/// late does not delay the machine. It grows by 100 ppm, so that it follows a control whose period
-/// is longer than it says. Between two records the position is linear; after the newest one it goes
-/// on for 20 ms, then the machine stands there. Records are kept for 2 s. Thread-safe.
+/// late does not delay the machine. The offset grows by 100 ppm, so that it follows a control whose
+/// period is longer than stated. Between two records the position is interpolated linearly. After
+/// the newest record the motion continues for 20 ms, then the machine stops. Records are kept for 2
+/// s. Thread-safe.
 
 #include <array>
 #include <chrono>
@@ -23,22 +24,22 @@ namespace abbe::sim {
 
 class FollowedMotion {
  public:
-  /// A record that is not homed, not newer than the newest one, or of a control that started again
-  /// (its cycle or period does not continue those before) is handled as follows: not homed: it is
-  /// counted, the machine stands; older: discarded; started again, or homed again: the records
-  /// before are forgotten.
+  /// Adds a record. Special cases: if the control is not homed, the record is counted and the
+  /// machine stands still; if the record is not newer than the newest one, it is discarded. If the
+  /// control has started again (cycle or period does not continue the earlier records) or was homed
+  /// again, the earlier records are discarded.
   /// `dated`: `arrival` may be used for the offset. False for the second and all further records of
   /// one reading of the socket, which may have arrived after the clock was read.
   void add(const protocol::PositionRecord& record, HostTime arrival, bool dated = true);
 
-  /// nullopt before the first record of a homed control.
+  /// The motion at time `at`; nullopt before the first record of a homed control.
   [[nodiscard]] std::optional<AxisMotion> at(HostTime at) const;
   [[nodiscard]] std::optional<HostTime> first() const;  ///< time of the first record
 
   struct Counts {
-    std::uint64_t received = 0;   ///< homed
+    std::uint64_t received = 0;   ///< records of a homed control
     std::uint64_t not_homed = 0;  ///< received before the control was homed
-    std::uint64_t lost = 0;       ///< missing between the numbers of two records
+    std::uint64_t lost = 0;       ///< records missing between the numbers of two records
     std::uint64_t restarts = 0;
   };
   [[nodiscard]] Counts counts() const;
@@ -58,8 +59,8 @@ class FollowedMotion {
   std::deque<Place> places_;  ///< ascending cycles
   std::chrono::nanoseconds period_{0}, offset_{0};
   std::uint32_t newest_number_ = 0;
-  std::int64_t newest_cycle_ = 0;  ///< counted on beyond 32 bits
-  bool homed_ = false;             ///< the newest record was
+  std::int64_t newest_cycle_ = 0;  ///< continues beyond 32 bits
+  bool homed_ = false;             ///< the newest record states that the control is homed
   std::optional<HostTime> first_;
   Counts counts_;
 };

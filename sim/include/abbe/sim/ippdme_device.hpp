@@ -38,7 +38,7 @@ struct IppDmeOptions {
   double probing_speed_m_s = 5e-3;
   std::chrono::nanoseconds home_time = std::chrono::seconds{2};
   bool speaks_move_reports = true;
-  bool keeps_moving = true;  ///< when the connection closes
+  bool keeps_moving = true;  ///< when the connection closes, a motion continues
   bool answers_aborts = true;
   bool aborts_outside_session = true;  ///< false: AbortE outside a session is an error
   bool refuses_aborts = false;         ///< answers AbortE with error 0500 and continues the motion
@@ -62,7 +62,7 @@ class IppDmeDevice {
   [[nodiscard]] bool accepts() const { return true; }
 
   void inject(const Fault& fault, HostTime now);
-  /// The operator puts something else on the table.
+  /// Replaces the artefact on the table, as an operator would do.
   void put_on_table(const MeasuringMachine& machine) { options_.machine = machine; }
 
   /// Presses the emergency stop: the motion ends and an unsolicited error is sent. Errors cannot be
@@ -78,7 +78,7 @@ class IppDmeDevice {
   static constexpr std::size_t kMostHeard = 4096;
   [[nodiscard]] const std::deque<std::string>& heard() const { return heard_; }
   [[nodiscard]] std::uint64_t touches() const { return touches_; }
-  /// Scale readings.
+  /// The scale readings, m.
   [[nodiscard]] Eigen::Vector3d reading_m(HostTime now) const;
 
  private:
@@ -87,7 +87,7 @@ class IppDmeDevice {
     std::string method;
     std::string arguments;
   };
-  /// A motion from one position to another, and what to report at its end.
+  /// A motion from one position to another, and the report at its end.
   struct Motion {
     Command command;
     Eigen::Vector3d from_m;

@@ -20,7 +20,7 @@ struct Sphere {
   double radius_m = 12.5e-3;
 };
 
-/// A square that can be touched from both sides.
+/// A square surface that can be touched from both sides.
 struct Face {
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
@@ -34,7 +34,7 @@ struct MeasuringMachine {
   std::optional<mfb::ClampedBar> bar;
   double tip_radius_m = 2e-3;
   double approach_m = 2e-3;  ///< probing begins this far before the nominal point
-  double search_m = 5e-3;    ///< probing ends this far behind the nominal point
+  double search_m = 5e-3;    ///< probing ends this far beyond the nominal point
   double noise_m = 0.0;      ///< standard deviation of a reading along the approach
   std::uint64_t seed = 1;
 };

@@ -26,25 +26,25 @@ enum class RegisterSpace { Holding, Input };
 struct SimulatedRegister {
   std::uint8_t unit = 1;  ///< 0: every unit
   RegisterSpace space = RegisterSpace::Holding;
-  std::uint16_t address = 0;  ///< on the wire
+  std::uint16_t address = 0;  ///< address on the wire
   std::uint16_t value = 0;
 };
 
 struct ModbusIdentity {
   ModbusModel model = ModbusModel::CometT7510;
   std::uint32_t serial_number = 20969999;
-  std::uint8_t unit = 1;  ///< of CometT7510 and Zt2005C8 on a serial line
+  std::uint8_t unit = 1;  ///< address of CometT7510 and Zt2005C8 on a serial line
 };
 
-/// A temperature input of Zt2005C8 that is broken since the instant `since`, counted as
-/// `since_start` below.
+/// A fault of a temperature input of Zt2005C8 from the instant `since` on, counted as `since_start`
+/// below.
 struct BrokenInput {
   FaultKind kind = FaultKind::SensorValue;  ///< one of the kinds SensorValue to SensorOtherSlave
-  std::uint8_t input = 0;                   ///< from 1; 0: all
+  std::uint8_t input = 0;                   ///< counted from 1; 0: all inputs
   double value = 0.0;
   std::chrono::nanoseconds since{};
 };
-/// What input number `input` (from 0) sends, in C.
+/// The temperature that input number `input` (from 0) sends, in C.
 [[nodiscard]] double reading_of_input(const EnvironmentModel& environment, std::size_t input,
                                       std::chrono::nanoseconds since_start,
                                       const std::vector<BrokenInput>& broken);

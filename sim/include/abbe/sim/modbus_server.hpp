@@ -47,8 +47,8 @@ class ModbusServer {
   void inject(const Fault& fault, HostTime now);
 
   [[nodiscard]] const std::string& name() const;
-  [[nodiscard]] std::uint16_t port() const;  ///< 0 on a pseudo terminal
-  [[nodiscard]] std::string path() const;    ///< of the pseudo terminal's link, empty with TCP
+  [[nodiscard]] std::uint16_t port() const;  ///< 0 if it is on a pseudo terminal
+  [[nodiscard]] std::string path() const;    ///< path of the pseudo terminal's link; empty for TCP
   /// Text such as "Modbus TCP on 127.0.0.1:40001" or "Modbus RTU on /tmp/rtd".
   [[nodiscard]] std::string where() const;
 

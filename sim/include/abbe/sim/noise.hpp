@@ -32,9 +32,9 @@ enum class NoiseStream : std::uint64_t {
   CounterCard = 2000,
 };
 
-/// Uniform in (0, 1).
+/// A random number with uniform distribution in (0, 1).
 [[nodiscard]] double uniform(std::uint64_t seed, std::uint64_t stream, std::uint64_t index);
-/// Standard normal.
+/// A random number with standard normal distribution.
 [[nodiscard]] double gaussian(std::uint64_t seed, std::uint64_t stream, std::uint64_t index);
 
 [[nodiscard]] inline double uniform(std::uint64_t seed, NoiseStream stream, std::uint64_t index) {

@@ -16,7 +16,7 @@ namespace abbe::sim {
 
 struct PathVertex {
   Eigen::Vector3d q_m = Eigen::Vector3d::Zero();
-  double feed_m_per_s = 0.0;  ///< of the leg that ends at this vertex; 0: the plan's feed
+  double feed_m_per_s = 0.0;  ///< feed on the leg that ends at this vertex; 0: the plan's feed
 };
 
 struct PathPlan {
@@ -25,8 +25,9 @@ struct PathPlan {
   double acceleration_m_per_s2 = 1.0;
   double dwell_s = 0.05;
   double wait_s = 0.0;  ///< duration of a wait at a vertex, after the dwell; 0: no wait
-  /// The first wait is at the first inner vertex, the last at the last one; between them the
-  /// machine waits at the first vertex that it reaches this long after the end of a wait.
+  /// The first wait is at the first inner vertex, the last wait at the last inner vertex. In
+  /// between, the machine waits at the first vertex that it reaches at least this long after the
+  /// end of a wait.
   double wait_every_s = 180.0;
 };
 
@@ -45,11 +46,11 @@ class PathMotion {
   [[nodiscard]] AxisMotion at(double time_s) const;
   [[nodiscard]] double duration_s() const { return end_s_; }
   [[nodiscard]] std::size_t legs() const { return legs_.size(); }
-  /// Time at which the machine leaves the first vertex of leg i. leg_end_s(): at which it stops at
-  /// the last vertex of leg i.
+  /// leg_begin_s(): time at which the machine leaves the first vertex of leg i. leg_end_s(): time
+  /// at which it stops at the last vertex of leg i.
   [[nodiscard]] double leg_begin_s(std::size_t i) const { return legs_[i].begin_s; }
   [[nodiscard]] double leg_end_s(std::size_t i) const;
-  /// Times at which waits begin, ascending.
+  /// Times at which the waits begin, ascending.
   [[nodiscard]] const std::vector<double>& waits_s() const { return waits_s_; }
 
  private:

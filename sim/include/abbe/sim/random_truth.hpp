@@ -15,12 +15,14 @@ namespace abbe::sim {
 struct RandomTruthOptions {
   std::uint64_t seed = 1;
   double mean_error_m = 100e-6;
-  double node_spacing_m = 0.05;  ///< rounded so that whole cells fill each axis
-  double beyond_m = 0.0;         ///< the nodes begin and end this far outside each axis
+  double node_spacing_m = 0.05;  ///< spacing, rounded so that whole cells fill each axis
+  double beyond_m = 0.0;         ///< the nodes extend this far beyond each end of the axis
   Shape shape = Shape::Linear;
-  /// Sine waves in each error function, 1 to 4; the shortest is 2 / harmonics of the axis long.
+  /// Number of sine waves in each error function, 1 to 4. The shortest has a wavelength of 2 /
+  /// harmonics of the axis.
   std::uint64_t harmonics = 4;
-  /// standard deviation of the backlash of translations, m; of rotations: the same number in rad
+  /// Standard deviation of the backlash of translations, m. For rotations the same number is used,
+  /// in rad.
   double backlash_m = 0.0;
 };
 

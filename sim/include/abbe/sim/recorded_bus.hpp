@@ -43,7 +43,7 @@ class RecordedBus {
 
  private:
   struct Answer {
-    std::chrono::nanoseconds delay{};  ///< after the SYNC
+    std::chrono::nanoseconds delay{};  ///< delay after the SYNC
     can::CanFrame frame;
   };
   struct Cycle {
@@ -83,7 +83,7 @@ class RecordedBus {
   /// used while the recording is read: the latest SYNC came from another producer
   bool foreign_sync_ = false;
   std::vector<Unsolicited> unsolicited_;
-  std::vector<Unsolicited> late_;  ///< delayed answers of current cycles, by send time
+  std::vector<Unsolicited> late_;  ///< delayed answers of current cycles, ordered by sending time
   std::map<SdoRequest, SdoResponses> sdo_;
   /// used while the recording is read: requests without a response yet
   std::map<can::NodeId, SdoRequest> asked_;

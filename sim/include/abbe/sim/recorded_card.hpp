@@ -42,7 +42,7 @@ class RecordedCard final : public ExportedCard {
   void host_disconnected() override;
   [[nodiscard]] HostTime breaks_at() const override;
 
-  /// Every recorded scan has been sent.
+  /// True if every recorded scan has been sent.
   [[nodiscard]] bool finished() const { return finished_; }
   [[nodiscard]] std::size_t transfers() const;
 
@@ -58,12 +58,12 @@ class RecordedCard final : public ExportedCard {
   };
   /// The scans from one start of the pacer to the next.
   struct Scan {
-    std::size_t begins = 0;  ///< the exchange that started it
+    std::size_t begins = 0;  ///< index of the exchange that started it
     std::size_t halts = 0;   ///< the next exchange that is not a status request
     std::vector<Transfer> transfers;
   };
   struct Connection {
-    std::size_t begins = 0;  ///< its first exchange
+    std::size_t begins = 0;  ///< index of its first exchange
     std::optional<HostTime> lost;
   };
 
@@ -89,15 +89,16 @@ class RecordedCard final : public ExportedCard {
   std::vector<Exchange> exchanges_;
   std::vector<Scan> scans_;
   std::vector<Connection> connections_;
-  unsigned versions_ = 0;  ///< while the recording is read: version requests on this connection
+  /// used while the recording is read: number of version requests on this connection
+  unsigned versions_ = 0;
 
-  bool opened_ = false;   ///< by this host
-  std::size_t next_ = 0;  ///< exchange
+  bool opened_ = false;   ///< the present host has opened the card
+  std::size_t next_ = 0;  ///< index of the next exchange
   std::optional<std::size_t> connection_;
   std::optional<std::size_t> scan_;
   std::size_t next_transfer_ = 0;
-  bool running_ = false;   ///< the pacer, for this host
-  bool flushing_ = false;  ///< the host halts the scan: the rest is sent at once
+  bool running_ = false;   ///< the pacer runs for the present host
+  bool flushing_ = false;  ///< the host halts the scan: the rest of the scan is sent at once
   bool resuming_ = false;  ///< the host restarts a scan that continued in the recording
   std::chrono::nanoseconds shift_{};
   std::deque<std::byte> fifo_;

@@ -23,8 +23,8 @@ struct DialogueWire {
   using Bytes = std::span<const std::byte>;
   /// Size of the first request in `bytes`; 0: the request is incomplete.
   std::size_t (*request_size)(Bytes bytes) = nullptr;
-  /// The part of a request that must be equal for two requests to get the same answer: all but the
-  /// number.
+  /// The part of a request that must be equal for two requests to get the same answer: all except
+  /// the number.
   Bytes (*meaning)(Bytes request) = nullptr;
   /// Replaces the number of the `recorded` request in its answer by the number of `request`.
   void (*renumber)(std::span<std::byte> answer, Bytes recorded, Bytes request) = nullptr;
@@ -53,7 +53,7 @@ class RecordedDialogue {
 
  private:
   struct Piece {
-    std::chrono::nanoseconds delay{};  ///< from the request
+    std::chrono::nanoseconds delay{};  ///< delay after the request
     std::vector<std::byte> bytes;
     bool breaks = false;  ///< the connection breaks after this piece
   };
@@ -80,7 +80,7 @@ class RecordedDialogue {
   void schedule(const Exchange& exchange, std::span<const std::byte> request, HostTime now);
 
   const DialogueWire& wire_;
-  bool serial_;  ///< a serial line: its opening is not visible, so there is one connection
+  bool serial_;  ///< a serial line: its opening cannot be detected, so it counts as one connection
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
   bool played_ = false;  ///< a client has connected before

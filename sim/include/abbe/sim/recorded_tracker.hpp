@@ -21,7 +21,7 @@ namespace abbe::sim {
 
 class RecordedTracker {
  public:
-  /// `timeline` must outlive it.
+  /// `timeline` must outlive this object.
   RecordedTracker(const RecordedDevice& device, ReplayTimeline& timeline);
 
   void connected(HostTime now);
@@ -33,7 +33,7 @@ class RecordedTracker {
   [[nodiscard]] bool wants_close() const { return wants_close_; }
   [[nodiscard]] bool accepts() const { return true; }
 
-  /// The whole recording has been sent.
+  /// True if the whole recording has been sent.
   [[nodiscard]] bool finished() const { return finished_; }
   [[nodiscard]] std::size_t packets() const;
 
@@ -43,7 +43,7 @@ class RecordedTracker {
   struct Unsolicited {
     HostTime time;
     Packet packet;
-    bool breaks = false;  ///< the connection breaks; `packet` is empty
+    bool breaks = false;  ///< the connection breaks; `packet` is then empty
   };
   struct Exchange {
     HostTime asked{};
@@ -56,7 +56,7 @@ class RecordedTracker {
     std::map<std::int32_t, std::vector<Exchange>> exchanges;  ///< by command
     std::vector<Unsolicited> unsolicited;
     std::optional<HostTime> first_start;
-    bool garbled = false;  ///< while the recording is read: bytes that are not packets
+    bool garbled = false;  ///< used while the recording is read: bytes that are not packets
   };
   struct Due {
     HostTime time;

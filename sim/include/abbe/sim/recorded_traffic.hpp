@@ -1,7 +1,7 @@
 #pragma once
-/// The raw bytes in a recording, by device, as they were transferred on the wire: the input of a
-/// replay. Reads complete and damaged MCAP files; only messages on abbe/v1/RawBytes are used. Pure;
-/// allocates.
+/// Reads the raw bytes of a recording by device, as they were transferred on the wire. They are the
+/// input of a replay. Accepts complete and damaged MCAP files; only messages on abbe/v1/RawBytes
+/// are used. Pure; allocates.
 
 #include <chrono>
 #include <cstddef>
@@ -22,10 +22,11 @@ struct RecordedBlock {
   bool hole_before = false;      ///< the recording lost blocks before this one
   std::vector<std::byte> bytes;  ///< bytes of one read or write; continued blocks are joined
 
-  /// An empty block from a device: a connection begins (of encoders: no frame arrived until this
-  /// time).
+  /// True for an empty block from a device: a new connection begins (for encoders: no frame arrived
+  /// until this time).
   [[nodiscard]] bool connects() const { return !to_device && bytes.empty(); }
-  /// An empty block to a device: the connection was lost, and it was not the daemon that closed it.
+  /// True for an empty block to a device: the connection was lost, and the daemon had not closed
+  /// it.
   [[nodiscard]] bool lost() const { return to_device && bytes.empty(); }
 };
 
@@ -61,16 +62,16 @@ struct RecordedDevice {
 /// the timeline maps it. A replay that is further off is synchronised with the timeline again.
 inline constexpr std::chrono::milliseconds kOutOfStep{50};
 
-/// Maps recorded time to replay time. All devices of a replay share one timeline, so that they stay
-/// synchronised. The first device that starts sets it.
+/// Converts recorded time to replay time. All devices of a replay share one timeline, so that they
+/// stay synchronised. The first device that starts sets the conversion.
 class ReplayTimeline {
  public:
   void start(HostTime recorded, HostTime now) {
     if (!shift_) shift_ = now - recorded;
   }
   void rewind() { shift_.reset(); }
-  /// Sets the map again, also while the timeline runs: a device that reconnects continues at its
-  /// recorded time.
+  /// Sets the conversion again, also while the timeline runs: a device that reconnects continues at
+  /// its recorded time.
   void restart(HostTime recorded, HostTime now) { shift_ = now - recorded; }
   [[nodiscard]] bool running() const { return shift_.has_value(); }
   [[nodiscard]] HostTime due(HostTime recorded) const {

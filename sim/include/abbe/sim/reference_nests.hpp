@@ -14,15 +14,15 @@ namespace abbe::sim {
 
 struct ReferenceNest {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< tracker frame
-  /// From `moved_at_s` on the nest is displaced by `moved_m`: something has pushed it.
+  /// From the time `moved_at_s` on, the nest is displaced by `moved_m`, as if it had been pushed.
   Eigen::Vector3d moved_m = Eigen::Vector3d::Zero();
   double moved_at_s = 0.0;
 };
 
 struct NestVisits {
   std::vector<ReferenceNest> nests{};
-  double stay_s = 4.0;  ///< at each nest
-  double move_s = 1.0;  ///< of the beam, from one target to the next
+  double stay_s = 4.0;  ///< time at each nest
+  double move_s = 1.0;  ///< time for which the beam moves from one target to the next
   /// Standard deviation of the position of a nest, per coordinate, from visit to visit.
   double repeatability_m = 3e-6;
   std::uint64_t seed = 1;

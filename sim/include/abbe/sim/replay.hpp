@@ -23,17 +23,17 @@ struct ReplaySetup {
   /// path of the link to a pseudo terminal, by the name of the device
   std::map<std::string, std::string> links;
   std::map<std::string, std::string> serials;  ///< of counter cards, by the name of the device
-  /// How the lines of a tracker leave, by its name; default: it listens.
+  /// Output of the lines of a tracker, by its name; by default it listens.
   std::map<std::string, LineOutput> lines;
 };
 
-/// Where a device is served.
+/// The place at which a device is served.
 struct ReplayedPlace {
   std::string name;
   RecordedKind kind{};
   std::string what;        ///< the amount of data, for messages: "12 packets"
   std::uint16_t port = 0;  ///< 0: on `path`
-  std::string path;        ///< of a pseudo terminal, or the name of a CAN interface
+  std::string path;        ///< path of a pseudo terminal, or name of a CAN interface
 };
 
 /// One device of a replay.
@@ -43,14 +43,14 @@ class ReplayedDevice {
   virtual void poll(HostTime now) = 0;
   [[nodiscard]] virtual HostTime next_due() const = 0;
   virtual void add_poll_fds(std::vector<pollfd>& fds) const = 0;
-  /// The whole recording has been sent.
+  /// True if the whole recording has been sent.
   [[nodiscard]] virtual bool finished() const = 0;
   [[nodiscard]] virtual ReplayedPlace place() const = 0;
 };
 
 class Replay {
  public:
-  /// Io if a port is in use.
+  /// Opens the replay. Io if a port is in use.
   [[nodiscard]] static Result<std::unique_ptr<Replay>> open(
       const std::vector<RecordedDevice>& devices, const ReplaySetup& setup, HostTime now);
 

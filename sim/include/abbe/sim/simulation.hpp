@@ -2,7 +2,7 @@
 /// The complete simulation: machine, the control that it follows, tracker, encoder bus, counter
 /// cards, measuring machine and scheduled faults, stepped together. poll(now) does what is due,
 /// never blocks and reads no clock; a program passes real time, a test any time. Not thread-safe.
-/// Exception: with `bus_apart` another thread may poll the encoder bus.
+/// Exception: if `bus_apart` is set, another thread may poll the encoder bus.
 
 #include <poll.h>
 
@@ -26,7 +26,8 @@ namespace abbe::sim {
 
 struct PrintedLines {
   lines::LineFormat format;
-  std::chrono::nanoseconds separation = std::chrono::milliseconds{2};  ///< of two points
+  /// interval between two points
+  std::chrono::nanoseconds separation = std::chrono::milliseconds{2};
   LineOutput output;
 };
 

@@ -41,7 +41,7 @@ class Socket {
 [[nodiscard]] Result<Socket> listen_tcp(std::uint16_t port);
 [[nodiscard]] Result<Socket> bind_udp(std::uint16_t port);
 [[nodiscard]] std::uint16_t port_of(const Socket& socket);
-/// 127.0.0.1 with this port, as sendto() wants it.
+/// The address 127.0.0.1 with this port, in the form that sendto() requires.
 [[nodiscard]] sockaddr_storage loopback_address(std::uint16_t port);
 /// Sends at most `most` bytes of `unsent` without blocking and removes the bytes sent.
 void send_what_fits(const Socket& client, std::vector<std::byte>& unsent,

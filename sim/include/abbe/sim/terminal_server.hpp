@@ -14,7 +14,7 @@ namespace abbe::sim {
 
 class TerminalServer {
  public:
-  /// `link`: path of the symbolic link to the client's end.
+  /// `link`: path of the symbolic link that the client opens.
   [[nodiscard]] static Result<TerminalServer> open(const std::string& link,
                                                    std::unique_ptr<RecordedDialogue> device,
                                                    HostTime now);

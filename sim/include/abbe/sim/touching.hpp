@@ -20,28 +20,29 @@ struct TouchingOptions {
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
   double approach_m = 1e-3;  ///< probing begins this far before the surface
-  double beyond_m = 0.3e-3;  ///< probing ends this far behind the surface
+  double beyond_m = 0.3e-3;  ///< probing ends this far beyond the surface
   double probing_m_per_s = 5e-3;
   double retract_m_per_s = 20e-3;
   double travel_m_per_s = 0.2;
   double acceleration_m_per_s2 = 1.0;
-  double noise_m = 3e-6;   ///< of machine and probe along the approach, per touch
-  double delay_s = 5e-6;   ///< from contact to the edge
+  double noise_m = 3e-6;  ///< standard deviation of machine and probe along the approach, per touch
+  double delay_s = 5e-6;  ///< delay from the contact to the edge
   double jitter_s = 1e-6;  ///< standard deviation of the delay from touch to touch
   std::uint64_t seed = 1;
-  // Fault injection, by number of the touch in the program, from 0.
-  std::set<std::size_t> missed;   ///< the probe does not trigger
-  std::set<std::size_t> doubled;  ///< made twice at the same point
-  std::set<std::size_t> stray;    ///< preceded by a trigger in the air, 40 mm from the surface
+  // Fault injection: each set contains numbers of touches in the program, counted from 0.
+  std::set<std::size_t> missed;   ///< the probe does not trigger at these touches
+  std::set<std::size_t> doubled;  ///< these touches are made twice at the same point
+  /// these touches are preceded by a trigger in the air, 40 mm from the surface
+  std::set<std::size_t> stray;
 };
 
 /// One probing move: a leg of the path and the surface that it approaches.
 struct ProbingMove {
-  std::size_t leg = 0;                                 ///< of the path
-  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();   ///< on the surface, true
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   ///< there, outward
-  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< of the ball
-  double radius_m = 0.0;                               ///< of the ball; 0: a face
+  std::size_t leg = 0;                                 ///< index of the leg of the path
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();   ///< true point on the surface
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   ///< outward normal at this point
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< centre of the ball
+  double radius_m = 0.0;                               ///< radius of the ball; 0: a face
   enum class Kind : std::uint8_t { Contact, Silent, InTheAir } kind = Kind::Contact;
 };
 
@@ -50,8 +51,8 @@ struct TouchingProgram {
   std::vector<ProbingMove> moves;
 };
 
-/// The whole procedure, from reading 0 of every axis. At every position: ball 1, block 1, block 2,
-/// then ball 2 to the last.
+/// The whole procedure, which starts at reading 0 of every axis. At every position: ball 1, block
+/// 1, block 2, then ball 2 to the last ball.
 [[nodiscard]] TouchingProgram plan_touching(const TruthMachine& truth, const BallArray& array,
                                             const TouchingOptions& options);
 

@@ -29,9 +29,9 @@ namespace emscon = protocol::emscon;
 
 struct TrackerOptions {
   TrackerModel model;
-  /// from a point to the earliest burst that contains it
+  /// Time from a point to the earliest burst that contains it.
   std::chrono::nanoseconds delay = std::chrono::milliseconds{1};
-  std::chrono::nanoseconds warm_up{};  ///< from power-on until the laser is stable
+  std::chrono::nanoseconds warm_up{};  ///< time from power-on until the laser is stable
   std::chrono::nanoseconds command_latency = std::chrono::milliseconds{10};
   std::chrono::nanoseconds initialize_time = std::chrono::seconds{2};
   /// Initialize moves the beam off the reflector; after this time the operator has brought the
@@ -57,14 +57,14 @@ class TrackerDevice {
 
   /// Bytes for the client that were made since the last call.
   [[nodiscard]] std::vector<std::byte> take_output();
-  /// The connection is to be closed after the output has been sent.
+  /// True if the connection must be closed after the output has been sent.
   [[nodiscard]] bool wants_close() const { return wants_close_; }
   /// False while the controller restarts: new connections are then closed at once.
   [[nodiscard]] bool accepts() const { return !booting_until_; }
 
   void inject(const Fault& fault, HostTime now);
 
-  /// When the first point of the first continuous measurement was taken.
+  /// Time at which the first point of the first continuous measurement was taken.
   [[nodiscard]] std::optional<HostTime> first_stream() const { return first_stream_; }
   [[nodiscard]] bool streaming() const { return stream_.has_value(); }
   [[nodiscard]] std::uint64_t points_sent() const { return points_sent_; }

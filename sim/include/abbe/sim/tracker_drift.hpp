@@ -1,5 +1,6 @@
 #pragma once
-/// Drift of the tracker over a run: what a fixed point seems to move, tracker frame. Pure.
+/// Drift of the tracker during a run: the apparent displacement of a fixed point, in the tracker
+/// frame. Pure.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -9,10 +10,10 @@ namespace abbe::sim {
 
 class TrackerDrift {
  public:
-  TrackerDrift() = default;  ///< none
-  /// In proportion to the time.
+  TrackerDrift() = default;  ///< no drift
+  /// A drift proportional to the time.
   [[nodiscard]] static TrackerDrift linear(const Eigen::Vector3d& at_end_m);
-  /// Random walk in 1000 steps; `at_end_m`: its standard deviation at the end, per axis.
+  /// A random walk of 1000 steps. `at_end_m`: its standard deviation at the end, per axis.
   [[nodiscard]] static TrackerDrift random_walk(const Eigen::Vector3d& at_end_m,
                                                 std::uint64_t seed);
 

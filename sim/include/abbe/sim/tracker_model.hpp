@@ -29,19 +29,20 @@ struct TrackerModel {
   Eigen::Vector3d rotation_rad{0.0013, -0.0342, 1.1};  ///< about x, y, z
   double sigma_range_m = 2e-6;
   double sigma_angle_rad = 3e-6;
-  double max_radial_speed_m_per_s = 4.0;  ///< SpeedExceeded above, SpeedWarning above 80 %
+  /// status SpeedExceeded above this speed, SpeedWarning above 80 % of it
+  double max_radial_speed_m_per_s = 4.0;
   double max_lateral_speed_m_per_s = 4.0;
   double clock_offset_s = 12345.0;  ///< reading of the tracker's clock at power-on
   double clock_drift_ppm = 15.0;    ///< rate error of the tracker's clock; positive: too fast
   TrackerDrift drift{};
-  NestVisits nests{};  ///< visited while the machine waits
+  NestVisits nests{};  ///< the nests that the beam visits while the machine waits
   std::uint64_t seed = 1;
 };
 
 enum class BeamSpeed { Allowed, Warning, Exceeded };
 
 struct TrackerView {
-  bool has_target = true;  ///< false: the beam moves, nothing is measured
+  bool has_target = true;  ///< false: the beam moves, and nothing is measured
   Eigen::Vector3d p_tracker_m = Eigen::Vector3d::Zero();
   BeamSpeed speed = BeamSpeed::Allowed;
 };

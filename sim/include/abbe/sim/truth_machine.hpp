@@ -54,8 +54,8 @@ struct AxisRange {
 struct AxisTruth {
   AxisRange range;
   std::array<ErrorFunction, kMotions> error;
-  /// Backlash b: the error is f + s b / 2, s = direction of the last motion (+1, -1; 0 before the
-  /// first). m or rad.
+  /// Backlash b, m or rad: the error is f + s b / 2, where s is the direction of the last motion
+  /// (+1, -1; 0 before the first motion).
   std::array<double, kMotions> backlash{};
 };
 
@@ -76,7 +76,7 @@ struct ThermalDrift {
 
 struct TruthMachine {
   std::array<Axis, 3> order{Axis::X, Axis::Y, Axis::Z};  ///< from workpiece to tool
-  std::array<AxisTruth, 3> axes;                         ///< by Axis, not by order
+  std::array<AxisTruth, 3> axes;                         ///< indexed by Axis, not by order
   Squareness squareness;
   ThermalDrift thermal;
   /// Sag under a moving load, which no error motion of a single axis describes. The target is lower
@@ -96,16 +96,16 @@ struct MachineCondition {
   double heat = 0.0;               ///< from 0 (cold) to 1 (final temperature)
 };
 
-/// The true position of the target in machine coordinates, at scale reading q.
+/// The true position of the target in machine coordinates at scale reading q.
 [[nodiscard]] Eigen::Vector3d position_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
                                          const MachineCondition& condition = {});
 
-/// V at scale reading q.
+/// The error V at scale reading q.
 [[nodiscard]] Eigen::Vector3d error_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
                                       const MachineCondition& condition = {});
 
-/// The order of X, Y, Z in a kinematic chain such as "[w X' b Y Z (C1) t]", from w to t. Other
-/// tokens have no influence on V.
+/// The order of X, Y and Z in a kinematic chain such as "[w X' b Y Z (C1) t]", from workpiece to
+/// tool. Other elements of the chain have no influence on V.
 [[nodiscard]] Result<std::array<Axis, 3>> parse_chain(std::string_view chain);
 
 }  // namespace abbe::sim

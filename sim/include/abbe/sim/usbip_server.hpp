@@ -33,8 +33,9 @@ class UsbipServer {
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
   [[nodiscard]] std::uint16_t port() const { return port_; }
-  [[nodiscard]] int listener_fd() const { return listener_.get(); }  ///< -1 while unplugged
-  [[nodiscard]] int client_fd() const { return client_.get(); }      ///< -1 without a client
+  /// -1 while the device is unplugged
+  [[nodiscard]] int listener_fd() const { return listener_.get(); }
+  [[nodiscard]] int client_fd() const { return client_.get(); }  ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
   /// Adds to `fds` the sockets that the caller must wait for, until next_due() at the latest.
   void add_poll_fds(std::vector<pollfd>& fds) const {
@@ -46,12 +47,12 @@ class UsbipServer {
   /// No effect with a recorded card.
   void inject(const Fault& fault, HostTime now);
 
-  // Fault injection by tests.
+  // Functions with which tests inject faults.
   void mute(bool yes) { mute_ = yes; }  ///< no scan data is sent; control requests are answered
   void disconnect();
   void plug_out();  ///< the connection is lost; new ones are closed at once
   void plug_in() { plugged_ = true; }
-  void send_bytes(std::span<const std::byte> bytes);  ///< any bytes, into the stream
+  void send_bytes(std::span<const std::byte> bytes);  ///< sends any bytes into the stream
   /// true: output is held back; false: it is sent with the next poll().
   void hold_output(bool yes) { hold_output_ = yes; }
   /// Sends the first `bytes` of the output that is held back.

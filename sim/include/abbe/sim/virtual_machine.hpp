@@ -19,7 +19,7 @@ namespace abbe::sim {
 
 class VirtualMachine {
  public:
-  /// `followed`: the motion of a control; nullptr: the machine drives `path`.
+  /// `followed`: the motion of a control; nullptr: the machine moves along `path`.
   VirtualMachine(TruthMachine truth, PathMotion path,
                  std::shared_ptr<const FollowedMotion> followed = nullptr)
       : truth_(std::move(truth)), path_(std::move(path)), followed_(std::move(followed)) {}
@@ -34,14 +34,14 @@ class VirtualMachine {
     if (start == kNever) return std::nullopt;
     return HostTime{std::chrono::nanoseconds{start}};
   }
-  /// When the machine reaches the end of the path; nullopt before start().
+  /// Time at which the machine reaches the end of the path; nullopt before start().
   [[nodiscard]] std::optional<HostTime> finished() const {
     const auto start = started();
     if (!start) return std::nullopt;
     return *start + seconds_to_ns(path_.duration_s());
   }
 
-  /// Scale readings q, m.
+  /// The scale readings q, m.
   [[nodiscard]] AxisMotion motion(HostTime at) const {
     if (followed_) {
       if (const auto motion = followed_->at(at)) return *motion;

@@ -10,11 +10,11 @@
 namespace abbe::sim {
 
 struct WeakStiffnessOptions {
-  /// Errors that no polynomial of order 3 describes: sag under a moving load near X 250 mm, and the
-  /// periodic error of a screw.
+  /// Errors that a polynomial of order 3 cannot describe: sag under a moving load near X = 250 mm,
+  /// and the periodic error of a screw.
   double sag_m = 0.0;       ///< at Y = 0.5 m
-  double periodic_m = 0.0;  ///< amplitude, of X along X
-  double period_m = 20e-3;  ///< of the screw
+  double periodic_m = 0.0;  ///< amplitude of the error of X along X
+  double period_m = 20e-3;  ///< period of the screw
 };
 
 /// V is 0 at ball 1 of the reference ball array, without sag and periodic error. Ranges, order and

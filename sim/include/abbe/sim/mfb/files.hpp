@@ -12,12 +12,12 @@
 
 namespace abbe::sim::mfb {
 
-/// What bar.toml states. The true bar differs from it.
+/// The values in bar.toml. The true bar differs from them.
 struct StatedBar {
   std::string name = "MFB-1";
   Pattern pattern;
-  std::vector<Eigen::Vector3d> O_m, u_m;          ///< points of interest, standard uncertainties
-  double alpha_per_K = 0.0, u_alpha_per_K = 0.0;  ///< both 0: not in the file
+  std::vector<Eigen::Vector3d> O_m, u_m;  ///< points of interest, and their standard uncertainties
+  double alpha_per_K = 0.0, u_alpha_per_K = 0.0;  ///< both 0: the file does not contain them
   std::optional<Sag> sag;
 };
 

@@ -1,8 +1,8 @@
 #pragma once
 /// The touches of a Multi-Feature Bar as a motion of the machine and edges of its probe, for
 /// devices on their wires. The machine passes the reading of every touch (probing.hpp) on a
-/// straight approach along the normal of the surface; the edge follows `delay_s` later. So the
-/// readings on the wire are those of points.csv, within jitter x feed. Collisions between two
+/// straight approach along the normal of the surface; the edge follows `delay_s` later. Therefore
+/// the devices send the readings of points.csv, within jitter x feed. Collisions between two
 /// touches are not simulated. Pure; deterministic from the seed.
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace abbe::sim::mfb {
 
 struct LiveProbing {
   double approach_m = 0.3e-3;  ///< probing begins this far before the surface
-  double beyond_m = 0.1e-3;    ///< probing ends this far behind the surface
+  double beyond_m = 0.1e-3;    ///< probing ends this far beyond the surface
   double probing_m_per_s = 4e-3;
   double retract_m_per_s = 50e-3;
   double travel_m_per_s = 0.3;
@@ -24,18 +24,20 @@ struct LiveProbing {
   double delay_s = 5e-6;   ///< from contact to the edge
   double jitter_s = 1e-6;  ///< standard deviation of the delay from touch to touch
   std::uint64_t seed = 1;
-  // Fault injection, by number of the touch in the programme, from 0.
-  std::set<std::size_t> missed;   ///< the probe does not trigger
-  std::set<std::size_t> doubled;  ///< made twice at the same point
-  std::set<std::size_t> stray;    ///< preceded by a trigger in the air, 40 mm from the surface
+  // Fault injection: each set contains numbers of touches in the program, counted from 0.
+  std::set<std::size_t> missed;   ///< the probe does not trigger at these touches
+  std::set<std::size_t> doubled;  ///< these touches are made twice at the same point
+  /// these touches are preceded by a trigger in the air, 40 mm from the surface
+  std::set<std::size_t> stray;
 };
 
 struct LiveProgram {
   PathPlan path;
-  std::vector<double> edges_s;  ///< of the probe, from the start of the motion, ascending
+  std::vector<double> edges_s;  ///< edges of the probe, s from the start of the motion, ascending
 };
 
-/// From reading 0 of every axis. BadInput for a feed or an acceleration that is not positive.
+/// The program, which starts at reading 0 of every axis. BadInput for a feed or an acceleration
+/// that is not positive.
 [[nodiscard]] Result<LiveProgram> live_program(const ProbedBar& probed, const LiveProbing& options);
 
 }  // namespace abbe::sim::mfb

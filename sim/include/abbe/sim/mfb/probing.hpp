@@ -22,15 +22,16 @@ struct Touch {
   std::size_t measurement = 0;
   Target target;
   Eigen::Vector3d reading_m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< of the surface, to the tip; machine axes
+  /// normal of the surface towards the tip, in machine axes
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
 };
 
 struct ProbedBar {
-  std::vector<Touch> touches;         ///< in the order of time
-  std::vector<double> temperature_C;  ///< stated, by measurement
+  std::vector<Touch> touches;         ///< in the order in which they were made
+  std::vector<double> temperature_C;  ///< stated temperature of each measurement
 };
 
-/// BadInput: a name in `turned`, `wrong_m` or `missed` is none of the plan, or the tip does not fit
+/// BadInput: a name in `turned`, `wrong_m` or `missed` is not in the plan, or the tip does not fit
 /// into the holes.
 [[nodiscard]] Result<ProbedBar> probe_bar(const TruthMachine& machine, const TrueBar& bar,
                                           std::span<const Measurement> plan,

@@ -81,10 +81,8 @@ class Decimation {
   explicit Decimation(std::uint32_t every) : every_(every) {}
   /// The sample to send, from the samples that one read returned; nullopt: none.
   [[nodiscard]] std::optional<ServoSample> choose(std::span<const ServoSample> read);
-  [[nodiscard]] std::uint64_t late() const {
-    return late_;
-  }  ///< number of due samples that were
-     ///< not sent
+  /// Number of due samples that were not sent.
+  [[nodiscard]] std::uint64_t late() const { return late_; }
 
  private:
   std::uint32_t every_;

@@ -35,9 +35,8 @@ struct ClampedBar {
 [[nodiscard]] ClampedBar clamped(const TrueBar& bar, std::span<const Measurement> plan,
                                  std::size_t m, const ProbingOptions& options);
 
-/// Distance between a tip with its centre at `tip_m` and the nearest surface of a feature. The
-/// surfaces of holes, rods and planes end beyond the outermost touches, at twice their distance
-/// from the middle of the feature.
+/// Distance between a tip with its centre at `tip_m` and the nearest surface of a feature.
+/// Assumption: the surfaces of holes, rods and planes end somewhat beyond their outermost touches.
 [[nodiscard]] double clearance_m(const ClampedBar& clamped, const Eigen::Vector3d& tip_m,
                                  double tip_radius_m);
 

@@ -28,9 +28,9 @@ class ControlLink {
   [[nodiscard]] const abbe_control& read();
   void write(const abbe_wanted& wanted);
 
-  /// Why the feeder must end: LinuxCNC has ended (perhaps without unloading abbe_correction), or
-  /// another feeder has replaced this one. Empty: it need not end. For the thread that calls
-  /// read().
+  /// The reason why the feeder must end: LinuxCNC has ended (perhaps without unloading
+  /// abbe_correction), or another feeder has replaced this one. Empty: it need not end. For the
+  /// thread that calls read().
   [[nodiscard]] std::string ended(Clock::time_point now);
   /// True: LinuxCNC has unloaded abbe_correction.
   [[nodiscard]] bool closed() const;

@@ -59,7 +59,7 @@ class Subscription {
   dds::Readers& readers_;
   dds::PublisherPin pin_;
   std::map<dds::ParticipantId, Publisher> publishers_;
-  std::string why_none_;  ///< why the publisher heard last is not used
+  std::string why_none_;  ///< reason why the publisher heard last is not used
   bool grid_changed_ = false;
   std::shared_ptr<const Usable> usable_ = std::make_shared<const Usable>();
 };

@@ -61,7 +61,7 @@ struct Reversal {
   mfb::ProbingOptions stated;
   mfb::TrueBar bar;
   TruthMachine machine;
-  mfb::StepGauge gauge;          ///< as gauge.toml states it
+  mfb::StepGauge gauge;          ///< gauge as gauge.toml states it
   mfb::ReversalOptions applied;  ///< options of the simulation
 };
 

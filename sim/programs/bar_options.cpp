@@ -12,7 +12,7 @@
 namespace abbe::sim {
 namespace {
 
-constexpr double kMmPerMinute = 1e-3 / 60.0;  // in m/s
+constexpr double kMmPerMinute = 1e-3 / 60.0;  // m/s per mm/min
 
 void add_bar(CLI::App& app, BarOptions& o) {
   app.add_option("--bar-seed", o.bar_seed, "seed of the bar itself (default: --seed)");
@@ -79,7 +79,7 @@ Result<void> add_outliers(const BarOptions& o, mfb::ProbingOptions& probing) {
 }
 
 Result<void> add_turned(const BarOptions& o, mfb::ProbingOptions& probing) {
-  constexpr std::string_view kAxisNames = "xyz";  // in the order of mfb::Turned
+  constexpr std::string_view kAxisNames = "xyz";  // letters in the order of mfb::Turned
   for (const std::string& text : o.turned) {
     const auto turned = split_at_equals(text, "--turned");
     ABBE_TRY(turned);

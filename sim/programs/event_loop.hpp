@@ -24,7 +24,7 @@ class EventLoop {
 
   [[nodiscard]] const SimClock& clock() const { return clock_; }
   [[nodiscard]] bool stopped() const;
-  /// As sim::wait(); SIGINT and SIGTERM end the wait too.
+  /// Same as sim::wait(), but SIGINT and SIGTERM also end the wait.
   void wait(std::vector<pollfd>& fds, HostTime due) const {
     sim::wait(fds, clock_, due, &mask_while_waiting_);
   }

@@ -21,7 +21,7 @@
 namespace abbe::sim {
 namespace {
 
-/// With a [sim] table the machine and its devices are simulated, too.
+/// Options of a live simulation: with a [sim] table the machine and its devices are simulated, too.
 struct LiveOptions {
   SetupChoices choices;
   std::string ports_file;

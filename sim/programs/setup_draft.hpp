@@ -19,7 +19,8 @@ struct SetupDraft {
   std::string artefact_file;
   std::int64_t seed = 1;
   double encoder_noise = 5e-9;
-  Eigen::Vector3d drift_at_end_m = Eigen::Vector3d::Zero();  ///< of the tracker
+  /// drift of the tracker at the end of the motion
+  Eigen::Vector3d drift_at_end_m = Eigen::Vector3d::Zero();
   bool drift_is_random_walk = false;
   bool nest_visits = true;
 };

@@ -20,8 +20,8 @@ namespace abbe::sim {
 
 /// The options of the command line; they override the files.
 struct SetupChoices {
-  std::string config_file;   ///< with a [sim] table; may name the machine file
-  std::string machine_file;  ///< with [machine], [axes.*], [target]
+  std::string config_file;   ///< file with a [sim] table; may name the machine file
+  std::string machine_file;  ///< file with [machine], [axes.*], [target]
   std::string path_file;
   std::string truth_file;
   std::optional<std::uint64_t> seed;

@@ -271,7 +271,7 @@ class Server final : public ControlServer {
     send_now(c, line);
   }
 
-  /// As cycle(), but a client whose cycle throws an exception is disconnected.
+  /// Same as cycle(), but a client whose cycle throws an exception is disconnected.
   bool cycle_alone(Client& c, short revents) noexcept {
     try {
       return cycle(c, revents);

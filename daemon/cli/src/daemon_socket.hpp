@@ -1,5 +1,5 @@
 #pragma once
-/// How a command finds the running daemon: by --socket, or by the socket in the configuration.
+/// Finds the running daemon for a command: by --socket, or by the socket in the configuration.
 
 #include <CLI/App.hpp>
 #include <chrono>

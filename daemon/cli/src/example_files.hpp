@@ -7,7 +7,7 @@
 namespace abbe::daemon {
 
 struct EmbeddedText {
-  std::string_view name;  ///< of the file, without folder
+  std::string_view name;  ///< name of the file, without folder
   std::string_view text;
 };
 

@@ -125,7 +125,7 @@ class SessionLog {
  private:
   std::string printed_;
   std::size_t noted_ = 0;
-  TablesSoFar tables_;  // what was printed last
+  TablesSoFar tables_;  // tables that were printed last
 };
 
 /// The session with the number `id`, running or ended; nullopt if the daemon does not keep it any

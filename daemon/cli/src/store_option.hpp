@@ -1,5 +1,5 @@
 #pragma once
-/// How a command finds the model store: by --store, or by the configuration of the daemon.
+/// Finds the model store for a command: by --store, or by the configuration of the daemon.
 
 #include <CLI/App.hpp>
 #include <string>

@@ -79,7 +79,7 @@ class ClassifiedSection {
   [[nodiscard]] std::vector<ClassifiedSection> children(std::string_view key,
                                                         std::string_view label);
 
-  // These functions are as in Section.
+  // The following functions read a value in the same way as those of Section.
   bool get(Key key, double& out, Unit unit, Bounds bounds, Need need = Need::Optional) {
     const bool given = section_.get(key.name, out, unit, bounds, need);
     return add(key, given, number_text(out * unit.per_si));

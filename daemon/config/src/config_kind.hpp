@@ -1,6 +1,6 @@
 #pragma once
-/// What the configuration module needs to know of one kind of device. Each kind of DeviceConfigs is
-/// defined in one file of src/kinds; config_kinds() lists all of them.
+/// The properties of one kind of device that the configuration module needs. Each kind of
+/// DeviceConfigs is defined in one file of src/kinds; config_kinds() lists all of them.
 
 #include <chrono>
 #include <optional>
@@ -17,10 +17,10 @@
 
 namespace abbe::daemon {
 
-/// How a device reads the axes.
+/// The axis readings of a device.
 struct AxisReadings {
   std::string_view key;  ///< key of the device's table
-  /// in the order of a sample; empty: the first axes of the machine
+  /// names in the order of a sample; empty: the first axes of the machine
   std::vector<std::string> axes;
   bool compensated = false;  ///< the control already corrects them
 };
@@ -31,7 +31,7 @@ struct AxisReadings {
 struct ConfigKind {
   std::string_view key;         ///< key of the kind's table
   bool several = false;         ///< an array of tables: [[KEY]]
-  std::string_view needs = {};  ///< without this key a table configures no device
+  std::string_view needs = {};  ///< key without which a table configures no device
 
   /// Reads and checks the table of this kind, adds the device to `out` and its name to `names`. The
   /// kinds that precede this one in DeviceConfigs have been read already.
@@ -64,7 +64,7 @@ struct ConfigKind {
 
 [[nodiscard]] std::span<const ConfigKind> config_kinds();
 
-/// As tables_with(), each table followed by the key that it requires: "[a] key or [b]".
+/// Same as tables_with(), but each table is followed by the key that it requires: "[a] key or [b]".
 [[nodiscard]] std::string needed_for(Capability capability);
 
 /// The axis readings of all devices that read the axes.

@@ -19,8 +19,9 @@ constexpr double kSecondsPerMinute = 60.0;
 
 /// The unit of a quantity in the file: value [SI] = number / per_si + zero.
 struct FileUnit {
-  std::string_view name;             ///< in keys of values: "C", "hPa", "percent"
-  std::string_view difference_name;  ///< in keys of differences and rates: "K", "hPa", "percent"
+  std::string_view name;  ///< unit in keys of values: "C", "hPa", "percent"
+  /// unit in keys of differences and rates: "K", "hPa", "percent"
+  std::string_view difference_name;
   double per_si;
   double zero;
 };

@@ -54,7 +54,7 @@ class WatchedMachines {
   struct Publisher {
     ReceivedModel model;
     std::optional<WriterId> state_from;  ///< writer of the last valid ModelState
-    WallClock::time_point state_at{};    ///< when that ModelState arrived
+    WallClock::time_point state_at{};    ///< time at which this ModelState arrived
     std::string position;
     /// The last samples of the durable topics, until the publisher is pinned, for --json.
     std::map<std::pair<daemon::Topic, std::string>, std::vector<std::byte>> not_shown;

@@ -91,7 +91,7 @@ class AliveWriters final : public fast::DataReaderListener {
 
   mutable std::mutex mutex_;
   std::set<WriterId> alive_;
-  std::map<WriterId, Time> lost_at_;  ///< when the writer was last lost
+  std::map<WriterId, Time> lost_at_;  ///< time at which the writer was last lost
 };
 
 }  // namespace

@@ -14,8 +14,8 @@ namespace abbe::daemon {
 using protocol::HostTime;
 
 struct DeviceSet::State {
-  std::vector<std::unique_ptr<RunningDevices>> started;  // in the order of starting
-  std::vector<RunningDevices*> devices;                  // in the order of device_kinds()
+  std::vector<std::unique_ptr<RunningDevices>> started;  // devices in the order of starting
+  std::vector<RunningDevices*> devices;                  // devices in the order of device_kinds()
   MachineMotion* motion = nullptr;   // motion functions of the measuring machine, if there is one
   TrackerOrders* tracker = nullptr;  // orders of the tracker, if there is one
   /// By stream: the time of the previous call of health(), and the number of samples at that time.
@@ -30,7 +30,7 @@ struct DeviceSet::State {
     while (!started.empty()) started.pop_back();
   }
 
-  std::map<std::string, Starvation> starved;  // by stream
+  std::map<std::string, Starvation> starved;  // one detector per stream
 
   StreamHealth health_of(const drivers::DeviceThread& thread, double nominal_rate_hz,
                          HostTime now) {

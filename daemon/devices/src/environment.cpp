@@ -103,7 +103,7 @@ class RunningEnvironment final : public RunningDevices {
   }
 
   std::vector<Running<drivers::EnvironmentLine>> lines_;
-  std::vector<OnLine> devices_;  // in the order of the configuration
+  std::vector<OnLine> devices_;  // devices in the order of the configuration
   std::size_t first_ = 0;        // index of the first device in DeviceNames::all
   BlockBuffer blocks_;
 };

@@ -14,7 +14,7 @@ extern const DeviceKind kReferenceCard;     // reference_card.cpp
 extern const DeviceKind kEnvironment;       // environment.cpp
 extern const DeviceKind kMeasuringMachine;  // measuring_machine.cpp
 
-/// In the order of the health report.
+/// All kinds, in the order of the health report.
 [[nodiscard]] inline auto all_kinds() {
   return std::array{kTracker,       kEncoder,     kCounterCard,
                     kReferenceCard, kEnvironment, kMeasuringMachine};

@@ -54,7 +54,8 @@ struct ReceivedFrame {
 };
 
 inline constexpr std::byte kAnswerAlive{0}, kAnswerTwin{1};
-inline constexpr std::size_t kLongestTwinText = 256;  // as in the IDL, Identity::twin_seen
+// same bound as in the IDL, Identity::twin_seen
+inline constexpr std::size_t kLongestTwinText = 256;
 
 /// Reads what abbe-dds sends. Sans-I/O.
 class AnswerReader {

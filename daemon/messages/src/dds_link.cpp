@@ -81,7 +81,7 @@ struct DdsLink::State {
   DdsLinkPeer allowed;
   DdsProcess* process = nullptr;
   FileDescriptor peer;
-  std::vector<std::byte> out;  ///< not yet sent: at most the rest of one frame
+  std::vector<std::byte> out;  ///< bytes not sent yet: at most the rest of one frame
   std::size_t out_begin = 0;
   RetainedPayloads<Pending> durable;
   /// Live samples that wait because the socket is full, with the times to which their ages refer.

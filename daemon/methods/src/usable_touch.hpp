@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// Why the touch cannot be used; empty if it can be used.
+/// The reason why the touch cannot be used; empty if it can be used.
 [[nodiscard]] std::string_view touch_fault(const protocol::Snapshot& touch);
 
 /// The rules of the configuration: device, longest pause, loss of the zero. If the operator has to

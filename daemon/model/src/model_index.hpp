@@ -28,7 +28,8 @@ struct ModelSummary {
   std::vector<std::string> inputs{};      ///< names of the files from which the model was made
   std::optional<ModelVerdict> verdict{};  ///< verdict in the file: decision and reasons
   std::optional<bool> simulated{};        ///< made_on_simulated_devices()
-  std::string fault{};  ///< why the file is not a valid model; all other members are then empty
+  /// reason why the file is not a valid model; all other members are then empty
+  std::string fault{};
   bool operator==(const ModelSummary&) const = default;
 };
 

@@ -56,8 +56,8 @@ std::string name_in_proc(const struct stat& file) {
   return fmt::format("{:02x}:{:02x}:{}", major(file.st_dev), minor(file.st_dev), file.st_ino);
 }
 
-/// Which process holds the lock, as text " (process 4711)"; empty if /proc/locks is not readable or
-/// does not list this file system.
+/// The process that holds the lock, as text " (process 4711)"; empty if /proc/locks is not readable
+/// or does not list this file system.
 std::string holder_of(int lock) {
   struct stat file {};
   if (::fstat(lock, &file) != 0) return {};

@@ -38,7 +38,7 @@ bool is_control(char c) {
   return static_cast<std::uint8_t>(c) < 0x20 || c == 0x7F;
 }
 
-/// At most kLongestText bytes of UTF-8 without control characters.
+/// The text without control characters, truncated to at most kLongestText bytes of UTF-8.
 std::string printable(std::string_view text) {
   std::string out;
   while (!text.empty()) {

@@ -51,7 +51,8 @@ tl::unexpected<daemon::Error> refused(const std::string& address, std::uint16_t 
 std::string text_of(const sockaddr_storage& peer, socklen_t size) {
   std::array<char, NI_MAXHOST> host{};
   std::array<char, NI_MAXSERV> port{};
-  const auto* generic = reinterpret_cast<const sockaddr*>(&peer);  // as the socket API requires
+  // the socket API requires this cast
+  const auto* generic = reinterpret_cast<const sockaddr*>(&peer);
   if (::getnameinfo(generic, size, host.data(), host.size(), port.data(), port.size(),
                     NI_NUMERICHOST | NI_NUMERICSERV) != 0)
     return "unknown address";

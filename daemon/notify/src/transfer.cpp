@@ -70,7 +70,8 @@ void set_common(CURL* easy, Exchange& exchange, const Receiver& receiver,
                 const TransferLimits& limits) {
   set(easy, CURLOPT_ERRORBUFFER, exchange.fault.data());
   set(easy, CURLOPT_NOSIGNAL, 1L);
-  set(easy, CURLOPT_QUICK_EXIT, 1L);  // at the end, do not wait for a name service that hangs
+  // at the end, libcurl does not wait for a name service that hangs
+  set(easy, CURLOPT_QUICK_EXIT, 1L);
   set(easy, CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(limits.connect.count()));
   set(easy, CURLOPT_TIMEOUT_MS, static_cast<long>(limits.whole.count()));
   set(easy, CURLOPT_FRESH_CONNECT, 1L);

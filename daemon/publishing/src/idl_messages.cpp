@@ -40,8 +40,8 @@ std::array<double, 6> upper_triangle(const calib::Matrix3& c) {
   return {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
 }
 
-/// At most kHullBound vertices of the validity hull, spread evenly. The hull of these vertices is
-/// inside the true one and only slightly smaller on every side.
+/// The vertices of the validity hull, or at most kHullBound of them, evenly spread. The hull of
+/// these vertices is inside the true one and only slightly smaller on every side.
 std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
   std::vector<v1::HullVertex> hull;
   for (const calib::Vector3& p : calib::spread_subset(validity.vertices_m(), kHullBound))

@@ -202,7 +202,8 @@ struct RecorderThread::State {
   std::atomic<std::uint64_t> passed{0};  // number of the last batch that was passed to the recorder
   std::atomic<std::int64_t> chunk_since_ns{0};  // see Recorder::open_chunk_since(); 0: none
   std::uint64_t dropped_before_run = 0;         // used by the hub
-  std::string internal_error;  // of the recorder thread; not passed to Recorder::fail() yet
+  // error of the recorder thread that was not passed to Recorder::fail() yet
+  std::string internal_error;
   std::atomic<std::uint64_t> dropped{0};
   std::atomic<bool> stopping{false};
   WakeUp wake_up;
@@ -308,7 +309,8 @@ struct RecorderThread::State {
   /// Counts a message that is dropped, and the messages whose loss before it the message reports.
   void lose(std::uint32_t& unreported_of, std::uint32_t lost_before) {
     unreported_of += 1 + lost_before;
-    dropped.fetch_add(1, std::memory_order_relaxed);  // only a counter: no ordering needed
+    // relaxed: only a counter, no ordering is needed
+    dropped.fetch_add(1, std::memory_order_relaxed);
   }
 
   void write(Waiting& data) {

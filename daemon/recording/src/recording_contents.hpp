@@ -27,7 +27,7 @@ struct ReadableChunk {
 
 struct Contents {
   std::map<std::uint16_t, std::string> topics;  ///< topic by channel
-  std::vector<ReadableChunk> chunks;            ///< with at least one message, in file order
+  std::vector<ReadableChunk> chunks;            ///< chunks with at least one message, in file order
   std::map<std::string, std::map<std::string, std::string>> metadata;
   std::vector<RecordingAttachment> attachments;
   std::vector<RecordingLoss> losses;

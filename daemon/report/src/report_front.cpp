@@ -59,7 +59,7 @@ void add_identity(HtmlReport& page, const ReportSubject& subject) {
       "certificate.toml.");
 }
 
-/// Of positioning and straightness of all axes, the value with the largest range of the mean, "X:
+/// The value of positioning or straightness, over all axes, with the largest range of the mean, "X:
 /// EYX ...".
 const CertifiedValue* worst_of_axes(const CertifiedValues& values) {
   const CertifiedValue* worst = nullptr;

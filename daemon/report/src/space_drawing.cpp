@@ -13,7 +13,7 @@
 namespace abbe::daemon {
 namespace {
 
-// In units of the SVG's view box, which is as wide as the page.
+// Sizes in units of the SVG's view box, which is as wide as the page.
 constexpr double kDrawingWidth = 720.0, kMargin = 46.0, kTitleHeight = 24.0;
 
 struct PlanePoint {

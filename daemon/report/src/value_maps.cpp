@@ -13,7 +13,7 @@
 namespace abbe::daemon {
 namespace {
 
-// In units of the SVG's view box, which is as wide as the page.
+// Sizes in units of the SVG's view box, which is as wide as the page.
 constexpr double kPage = 720.0, kLeft = 62.0, kRight = 76.0, kGap = 14.0;
 constexpr double kTop = 40.0, kBottom = 36.0, kBar = 12.0;
 constexpr double kFlattest = 0.35, kSteepest = 1.4;  // limits of the ratio height / width of a map

@@ -133,9 +133,9 @@ class BackgroundThreads {
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::condition_variable work_waits_;
-  std::deque<BackgroundTask> waiting_;  // under mutex_
-  std::size_t idle_ = 0;                // under mutex_: threads that wait
-  bool ending_ = false;                 // under mutex_
+  std::deque<BackgroundTask> waiting_;  // guarded by mutex_
+  std::size_t idle_ = 0;                // number of threads that wait; guarded by mutex_
+  bool ending_ = false;                 // guarded by mutex_
   std::vector<std::thread> threads_;    // the threads of the dispatcher
   const pid_t process_ = ::getpid();
   std::thread dispatcher_;

@@ -43,9 +43,9 @@ struct CountingStateThread::Work {
   std::string fault = {};
   std::mutex mutex = {};
   std::condition_variable wake = {};
-  bool stopping = false;      // under mutex
+  bool stopping = false;      // guarded by mutex
   std::mutex outside = {};    // locked while look_at or report runs
-  bool left_running = false;  // under outside: the owner of the thread was destroyed
+  bool left_running = false;  // the owner of the thread was destroyed; guarded by `outside`
   WakeUp ended = {};
   detail::RunningWork running = {};
 };

@@ -49,7 +49,7 @@ class DdsSide {
   std::optional<Publisher> publisher_;
   std::optional<DdsSupervisor> supervisor_;
   mutable std::mutex mutex_;
-  std::optional<ObservedParticipant> participant_;  // under mutex_
+  std::optional<ObservedParticipant> participant_;  // guarded by mutex_
 };
 
 }  // namespace abbe::daemon

@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kStandsFor = 500ms;
-// in m or rad; the positions of an axis in position control scatter by less than this
+// positions (m or rad) of an axis in position control scatter by less than this
 constexpr double kStill = 2e-6;
 constexpr double kStillCounts = 2.0;  // an axis at rest may change by this many counts
 

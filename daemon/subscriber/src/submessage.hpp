@@ -32,9 +32,10 @@ struct Submessage {
   /// Signed by DDS Security: a change would make the receiver drop the submessage. Its sender is
   /// trusted.
   bool is_signed = false;
-  std::span<const std::uint8_t, kHeaderBytes> header;  ///< with the GUID prefix of the sender
-  const SequenceWindow* window = nullptr;              ///< nullptr: numbers are not limited
-  Reassembly* reassembly = nullptr;  ///< nullptr: fragments of authentication are skipped
+  /// header of the RTPS message, with the GUID prefix of the sender
+  std::span<const std::uint8_t, kHeaderBytes> header;
+  const SequenceWindow* window = nullptr;  ///< nullptr: numbers are not limited
+  Reassembly* reassembly = nullptr;        ///< nullptr: fragments of authentication are skipped
   [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
   [[nodiscard]] Reader reader() const { return {body, has(kLittleEndian)}; }
 };

@@ -308,7 +308,7 @@ void add_planes(HtmlReport& page, const Verification& v) {
   }
 
   const calib::Vector3 wanted = v.planes_m.value_or(0.5 * (low + high));
-  constexpr double kLongestArrow = 0.1;  // as a fraction of the diagonal of the volume
+  constexpr double kLongestArrow = 0.1;  // fraction of the diagonal of the volume
   const double magnification = round_number(kLongestArrow * (high - low).norm() / longest_m);
   page.heading("Vectors in three planes");
   page.paragraph(

@@ -14,7 +14,7 @@ namespace {
 
 using protocol::RawBlock;
 
-constexpr std::size_t kMostTransferBytes = 16384;  // as the manufacturer's library
+constexpr std::size_t kMostTransferBytes = 16384;  // same value as in the manufacturer's library
 
 CounterCardOptions completed(const CounterCardOptions& options, const UsbLink& link) {
   CounterCardOptions all = options;

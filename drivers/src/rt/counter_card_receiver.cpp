@@ -32,7 +32,7 @@ constexpr double kWidestInterval = 0.02;
 constexpr double kResumedWithin_s = std::chrono::duration<double>(ClockModelOptions{}.jump).count();
 constexpr double kResumedDrift = ClockModelOptions{}.max_skew;
 constexpr double kResumedShown_s = 0.25;    // enough time to process the backlog of a delayed host
-constexpr double kResumedPatience_s = 3.0;  // as kLatest_s
+constexpr double kResumedPatience_s = 3.0;  // same value as kLatest_s
 /// Same as kWidestInterval, for counters of an earlier run. It is smaller because no process
 /// observed the card between the two runs: its counters may have been set up again shortly after
 /// the first run.

@@ -60,7 +60,8 @@ struct LibusbLink::State {
     State* state = nullptr;
     libusb_transfer* transfer = nullptr;
     std::vector<unsigned char> buffer;
-    bool resubmit = false;  ///< in the next wait(), because the caller may still read `bytes`
+    /// resubmitted in the next wait(), because the caller may still read `bytes`
+    bool resubmit = false;
   };
 
   /// A connected device with matching vendor and product, and its bus address.
@@ -383,7 +384,7 @@ struct LibusbLink::State {
   int init_error = 0;
   libusb_device_handle* handle = nullptr;
   std::vector<Seen> cards;  ///< found by the latest find()
-  std::string serial;       ///< of the opened device
+  std::string serial;       ///< serial number of the opened device
   bool closing = false;     ///< close() was called, but transfers have not ended
   bool lost = false;
 
@@ -398,7 +399,7 @@ struct LibusbLink::State {
   bool stopping = false;
 
   std::vector<UsbEvent> events;     ///< for the next return of wait()
-  std::vector<UsbEvent> delivered;  ///< by the latest wait()
+  std::vector<UsbEvent> delivered;  ///< events that the latest wait() returned
 };
 
 LibusbLink::LibusbLink(const UsbIdentity& identity, const TimeSource& time)

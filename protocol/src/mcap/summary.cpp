@@ -41,7 +41,7 @@ bool keep(Summary& summary, const Record& record) {
 
 struct FooterAt {
   Footer footer;
-  std::size_t offset = 0;  ///< of its opcode in the tail
+  std::size_t offset = 0;  ///< offset of its opcode in the tail
 };
 
 /// `begin`: offset of the tail in the file.

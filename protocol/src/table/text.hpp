@@ -59,7 +59,7 @@ class Lines {
 
 struct Cell {
   std::string_view text;   ///< trimmed
-  std::size_t column = 1;  ///< of the first character, counted from 1
+  std::size_t column = 1;  ///< column of the first character, counted from 1
 };
 
 /// Iterates over the cells of a line; next() returns false after the last one.

@@ -10,7 +10,7 @@ using Eigen::Vector3d;
 
 constexpr double kReferenceLength_m = 0.55;
 constexpr double kReach_m = 0.1;    // lateral reach of a star stylus
-constexpr double kStylus_m = 0.15;  // from the tool reference point down
+constexpr double kStylus_m = 0.15;  // distance from the tool reference point down to the tip
 
 const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ();
 

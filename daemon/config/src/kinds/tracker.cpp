@@ -168,8 +168,8 @@ double default_u_scale(WeatherConfig weather, const toml::node* air) {
   return corrected ? 0.0 : u_of_unmeasured_air();
 }
 
-/// As read_tracker_mode(), for a program that sends lines of text. The program determines rate and
-/// duration; abbe must know them.
+/// Same as read_tracker_mode(), for a program that sends lines of text. The program determines rate
+/// and duration; abbe must know them.
 void read_mode_of_lines(ClassifiedSection& tracker, TrackerConfig& out) {
   using protocol::lines::Column;
   constexpr std::int64_t kLongest_ms = 60'000;

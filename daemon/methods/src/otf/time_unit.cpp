@@ -16,7 +16,7 @@ namespace {
 
 using calib::Vector3;
 
-constexpr double kMmPerMin = 60.0e3;  // per m/s
+constexpr double kMmPerMin = 60.0e3;  // mm/min per m/s
 constexpr double kMostFactor = 20.0;  // between speed and feed
 constexpr double kSlowest_m_per_s = 30.0 / kMmPerMin, kFastest_m_per_s = 200e3 / kMmPerMin;
 

@@ -37,7 +37,7 @@ struct DeviceStatus {
   std::uint64_t time_widened = 0;  ///< receives whose kernel stamp could not be used
   ClockStatus clock;
   protocol::HostTime last_sample{};  ///< instant of the latest sample; epoch if none yet
-  std::string condition;   ///< what is wrong now: "X missing (node 1)"; empty if nothing is
+  std::string condition;   ///< present fault: "X missing (node 1)"; empty if there is none
   std::string last_fault;  ///< "what was tried: what was seen"; empty if none yet
   protocol::HostTime last_fault_at{};
 };

@@ -53,7 +53,7 @@ class HostAddresses {
  private:
   struct Shared;
   void begin_look_up();
-  std::shared_ptr<Shared> shared_;  // also owned by the thread of a look-up
+  std::shared_ptr<Shared> shared_;  // shared with the thread of a look-up
   HostAddressesOptions options_;
   unsigned tries_ = 0;
 };

@@ -49,7 +49,7 @@ struct AxesAt {
   /// bit i: at least one of the two enclosing samples has no value of axis i; the position and
   /// velocity of axis i are then out of date
   std::uint8_t missing_mask = 0;
-  protocol::SampleFlags flags = 0;                      ///< of both enclosing samples
+  protocol::SampleFlags flags = 0;                      ///< flags of both enclosing samples
   std::array<double, protocol::kMaxAxes> position{};    ///< m or rad
   std::array<double, protocol::kMaxAxes> velocity{};    ///< m/s or rad/s
   std::array<double, protocol::kMaxAxes> u_position{};  ///< standard uncertainty, m or rad

@@ -24,7 +24,7 @@
 
 namespace abbe::drivers {
 
-/// When bytes arrived. `u_time` is a standard uncertainty (k = 1).
+/// The time at which bytes arrived. `u_time` is a standard uncertainty (k = 1).
 struct Arrival {
   protocol::HostTime time{};
   std::chrono::nanoseconds u_time{};

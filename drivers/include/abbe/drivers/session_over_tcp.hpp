@@ -133,7 +133,7 @@ class SessionOverTcp {
   TcpPeer peer_;
   const TimeSource& time_;
   StatusBoard board_;
-  protocol::HostTime arrival_{};  ///< of received(), or of the connection
+  protocol::HostTime arrival_{};  ///< arrival of received(), or time of the connection
 
  private:
   /// This many reads of kMostRead = 64 kB are 8 MB: more than the kernel buffers by default for one
@@ -214,7 +214,8 @@ class SessionOverTcp {
   std::size_t filled_ = 0;
   std::size_t late_reads_ = 0;  ///< consecutive reads after the deadline
   std::array<std::byte, Words::kMostRead> buffer_{};
-  std::array<Message, Words::kInbox> inbox_{};  ///< from receive() to the next wait(), same thread
+  /// passed from receive() to the next wait(), same thread
+  std::array<Message, Words::kInbox> inbox_{};
   std::size_t inbox_count_ = 0;
   std::uint64_t inbox_lost_ = 0;
 };

@@ -38,7 +38,7 @@ class Counter {
 /// writer never waits. Memory fences as in the seqlock of [Boehm 2012].
 class FaultText {
  public:
-  static constexpr std::size_t kCapacity = 248;  ///< as much as a Health message carries
+  static constexpr std::size_t kCapacity = 248;  ///< same as the bound of a Health message
 
   /// Writer thread.
   void set(protocol::HostTime at, std::string_view text) ABBE_RT;

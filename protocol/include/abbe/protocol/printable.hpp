@@ -13,7 +13,7 @@ namespace abbe::protocol {
 /// changes nothing more.
 [[nodiscard]] std::string printable(std::string_view text);
 
-/// As printable(), but a newline is written as "\u{A}": for one line of a log.
+/// Same as printable(), but a newline is written as "\u{A}": for one line of a log.
 [[nodiscard]] std::string printable_line(std::string_view text);
 
 /// `text` with every control character except a newline as an escape. Other characters remain, also

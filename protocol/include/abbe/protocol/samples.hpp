@@ -76,7 +76,7 @@ struct AxisSample {
   std::array<double, kMaxAxes> position{};     ///< scale reading, m (linear) or rad (rotary)
 };
 
-/// How the instant of a touch was determined.
+/// The way in which the instant of a touch was determined.
 enum class TouchLatch : std::uint8_t {
   Clock = 0,     ///< the edge latched a counter of the card
   Scan = 1,      ///< between two scans, not known more precisely
@@ -123,8 +123,8 @@ struct ProbeTrigger {
   std::uint8_t axis_count = 0;
   std::uint8_t missing_mask = 0;                ///< bit i: axis i is not known
   double speed_m_s = 0.0;                       ///< approach speed of the linear axes
-  std::array<double, kMaxAxes> position{};      ///< at contact, m or rad
-  std::array<double, kMaxAxes> velocity{};      ///< of the approach, m/s or rad/s
+  std::array<double, kMaxAxes> position{};      ///< position at contact, m or rad
+  std::array<double, kMaxAxes> velocity{};      ///< velocity of the approach, m/s or rad/s
   std::array<double, kMaxAxes> u_position{};    ///< standard uncertainty
   std::array<double, kMaxAxes> U95_position{};  ///< half 95 % interval; for Scan not 2 u
 };
@@ -197,7 +197,7 @@ struct RawBlock {
   static constexpr std::size_t kCapacity = 2048;
   enum class Direction : std::uint8_t { FromDevice = 0, ToDevice = 1 };
 
-  HostTime time{};  ///< of arrival (FromDevice) or sending (ToDevice)
+  HostTime time{};  ///< time of arrival (FromDevice) or of sending (ToDevice)
   /// blocks dropped between the previous one in the ring and this one
   std::uint32_t lost_before = 0;
   std::uint16_t length = 0;

@@ -17,13 +17,15 @@ struct ArrayBall {
 };
 struct ArrayFace {
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   ///< outward
-  Eigen::Vector3d half_1_m = Eigen::Vector3d::Zero();  ///< from the centre to the middle of an edge
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< outward
+  /// vector from the centre to the middle of an edge
+  Eigen::Vector3d half_1_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d half_2_m = Eigen::Vector3d::Zero();
 };
 struct BallArray {
   std::string name = "L array";
-  std::vector<ArrayBall> balls;  ///< in the frame of the array: the first ball is at the origin
+  /// balls in the frame of the array: the first ball is at the origin
+  std::vector<ArrayBall> balls;
   std::array<ArrayFace, 2> faces;
   double tip_radius_m = 1e-3;
 };
@@ -33,7 +35,8 @@ struct BallArray {
 /// T_machine_array for the positions 1 to 8.
 [[nodiscard]] std::vector<Eigen::Isometry3d> reference_positions();
 
-/// How the true array differs from its calibrator.toml. By default it has 20 C and does not differ.
+/// Differences between the true array and its calibrator.toml. By default the array has 20 C and
+/// does not differ.
 struct ArrayState {
   double temperature_C = 20.0;
   double alpha_per_K = 0.0;  ///< thermal expansion; 0: calibrator.toml has no alpha keys

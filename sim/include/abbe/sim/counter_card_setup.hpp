@@ -16,10 +16,10 @@ struct CardAxis {
   /// name of the axis: X, Y, Z follow the path; any other is a rotary axis
   std::string name = "X";
   std::uint8_t channel = 0;
-  double step = 10e-9;           ///< m or rad per count; negative: counts fall as the reading rises
-  double noise = 0.0;            ///< standard deviation of one reading, m or rad
-  RotarySwing swing;             ///< rotary axis: its motion
-  double signal_period = 0.0;    ///< of the distance-coded marks, m or rad; 0: no marks
+  double step = 10e-9;         ///< m or rad per count; negative: counts fall as the reading rises
+  double noise = 0.0;          ///< standard deviation of one reading, m or rad
+  RotarySwing swing;           ///< rotary axis: its motion
+  double signal_period = 0.0;  ///< signal period of the distance-coded marks, m or rad; 0: no marks
   int nominal_increment = 1000;  ///< signal periods between two fixed marks
   double marks_zero = 0.0;       ///< scale reading of the first fixed mark
   int mark_pairs = 500;

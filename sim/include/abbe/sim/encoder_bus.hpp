@@ -50,7 +50,7 @@ class EncoderBus {
 
   std::unique_ptr<CanPort> port_;
   std::deque<EncoderNode> nodes_;    ///< a deque keeps the addresses of the nodes stable
-  std::vector<TimedFrame> waiting_;  ///< by due time
+  std::vector<TimedFrame> waiting_;  ///< frames ordered by due time
   std::optional<HostTime> bus_off_until_;
   std::chrono::nanoseconds sync_period_{};
   HostTime next_sync_ = HostTime::max();

@@ -59,7 +59,7 @@ class EncoderNode {
   void mute_until(HostTime until) { mute_until_ = until; }
   /// Until the instant `until`, every frame is sent later than normal by `delay`.
   void delay_until(HostTime until, std::chrono::nanoseconds delay);
-  void restart(HostTime now);  ///< as after a power cut
+  void restart(HostTime now);  ///< restarts the node, as after a power cut
   void emergency(std::uint16_t code, std::uint8_t error_register, HostTime now);
 
   [[nodiscard]] can::NodeId node() const { return options_.node; }

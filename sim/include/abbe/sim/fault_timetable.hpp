@@ -11,7 +11,8 @@ namespace abbe::sim {
 
 class FaultTimetable {
  public:
-  void add(const ScheduledFault& fault);  ///< in any order; only before the first take_due()
+  /// faults may be added in any order, but only before the first take_due()
+  void add(const ScheduledFault& fault);
 
   /// Time of the next fault; HostTime::max(): no fault is left, or the machine has not started to
   /// move.

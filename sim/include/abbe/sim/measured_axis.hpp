@@ -1,6 +1,6 @@
 #pragma once
-/// What a scale of the virtual machine measures: one of its linear axes, or a rotary axis. Errors
-/// of rotary axes are not simulated: their motion does not move the target.
+/// The axis that a scale of the virtual machine measures: one of its linear axes, or a rotary axis.
+/// Errors of rotary axes are not simulated: their motion does not move the target.
 
 #include <variant>
 

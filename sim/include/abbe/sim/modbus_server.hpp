@@ -18,7 +18,7 @@
 namespace abbe::sim {
 
 struct ModbusTcpEndpoint {
-  std::uint16_t port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
+  std::uint16_t port = 0;  ///< port on 127.0.0.1; 0: the kernel chooses
 };
 /// `link`: the path of a symbolic link to the client's end of the pseudo terminal. An existing link
 /// is replaced.

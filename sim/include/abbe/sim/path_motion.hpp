@@ -34,7 +34,8 @@ struct PathPlan {
 struct AxisMotion {
   Eigen::Vector3d q_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();
-  std::array<int, 3> direction{};  ///< per axis: sign of the last motion, 0 before the first
+  /// sign of the last motion of each axis, 0 before the first motion
+  std::array<int, 3> direction{};
 };
 
 class PathMotion {

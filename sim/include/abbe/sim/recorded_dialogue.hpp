@@ -17,7 +17,7 @@
 
 namespace abbe::sim {
 
-/// How one protocol splits a stream of bytes into requests, and how requests are compared. The
+/// Functions of one protocol that split a stream of bytes into requests and compare requests. The
 /// number of a request is its transaction number or tag, which its answer repeats.
 struct DialogueWire {
   using Bytes = std::span<const std::byte>;
@@ -31,7 +31,7 @@ struct DialogueWire {
   /// The answer to a request that is not in the recording.
   std::vector<std::byte> (*refusal)(Bytes request) = nullptr;
 };
-/// How requests of ModbusTcp, ModbusRtu or MeasuringMachine are split and compared.
+/// The functions for ModbusTcp, ModbusRtu or MeasuringMachine.
 [[nodiscard]] const DialogueWire& dialogue_wire(RecordedKind kind);
 
 class RecordedDialogue {

@@ -53,7 +53,7 @@ class RecordedTracker {
   };
   struct Connection {
     HostTime began{};
-    std::map<std::int32_t, std::vector<Exchange>> exchanges;  ///< by command
+    std::map<std::int32_t, std::vector<Exchange>> exchanges;  ///< exchanges by command
     std::vector<Unsolicited> unsolicited;
     std::optional<HostTime> first_start;
     bool garbled = false;  ///< used while the recording is read: bytes that are not packets

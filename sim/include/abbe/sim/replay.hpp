@@ -17,12 +17,13 @@
 namespace abbe::sim {
 
 struct ReplaySetup {
-  std::uint16_t tracker_port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
+  std::uint16_t tracker_port = 0;  ///< port on 127.0.0.1; 0: the kernel chooses
   CanPortOptions bus;
   std::map<std::string, std::uint16_t> ports;  ///< TCP, by the name of the device
   /// path of the link to a pseudo terminal, by the name of the device
   std::map<std::string, std::string> links;
-  std::map<std::string, std::string> serials;  ///< of counter cards, by the name of the device
+  /// serial numbers of counter cards, by the name of the device
+  std::map<std::string, std::string> serials;
   /// Output of the lines of a tracker, by its name; by default it listens.
   std::map<std::string, LineOutput> lines;
 };

@@ -122,7 +122,7 @@ class Simulation {
   std::deque<UsbipServer> counter_cards_;
   std::optional<IppDmeServer> measuring_machine_;
   std::deque<double> edges_s_;  ///< probe edges not yet passed to the card
-  FaultTimetable faults_;       ///< of all devices except the bus
+  FaultTimetable faults_;       ///< faults of all devices except the bus
 };
 
 }  // namespace abbe::sim

@@ -75,7 +75,7 @@ struct ThermalDrift {
 };
 
 struct TruthMachine {
-  std::array<Axis, 3> order{Axis::X, Axis::Y, Axis::Z};  ///< from workpiece to tool
+  std::array<Axis, 3> order{Axis::X, Axis::Y, Axis::Z};  ///< axes from workpiece to tool
   std::array<AxisTruth, 3> axes;                         ///< indexed by Axis, not by order
   Squareness squareness;
   ThermalDrift thermal;
@@ -92,8 +92,8 @@ struct TruthMachine {
 
 /// The state on which the error depends, in addition to the position.
 struct MachineCondition {
-  std::array<int, 3> direction{};  ///< per axis: sign of its last motion
-  double heat = 0.0;               ///< from 0 (cold) to 1 (final temperature)
+  std::array<int, 3> direction{};  ///< sign of the last motion of each axis
+  double heat = 0.0;               ///< heat from 0 (cold) to 1 (final temperature)
 };
 
 /// The true position of the target in machine coordinates at scale reading q.

@@ -12,7 +12,7 @@ namespace abbe::sim {
 struct WeakStiffnessOptions {
   /// Errors that a polynomial of order 3 cannot describe: sag under a moving load near X = 250 mm,
   /// and the periodic error of a screw.
-  double sag_m = 0.0;       ///< at Y = 0.5 m
+  double sag_m = 0.0;       ///< amplitude of the sag at Y = 0.5 m
   double periodic_m = 0.0;  ///< amplitude of the error of X along X
   double period_m = 20e-3;  ///< period of the screw
 };

@@ -62,7 +62,7 @@ class AccountNames {
 
  private:
   struct Shared;
-  std::shared_ptr<Shared> shared_;  // also owned by the threads of look-ups
+  std::shared_ptr<Shared> shared_;  // shared with the threads of look-ups
 };
 
 /// The only instance of the process, for the accounts of this computer.

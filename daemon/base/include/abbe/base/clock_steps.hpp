@@ -11,7 +11,7 @@
 namespace abbe::daemon {
 
 struct ClockReading {
-  std::chrono::nanoseconds utc{};         ///< since 1970
+  std::chrono::nanoseconds utc{};         ///< time since 1970
   std::chrono::nanoseconds since_boot{};  ///< CLOCK_BOOTTIME: includes suspend; cannot be set
   std::chrono::nanoseconds running{};     ///< CLOCK_MONOTONIC: without suspend
 };
@@ -22,7 +22,7 @@ struct ClockChange {
   /// The wall clock was set forward by this; negative: backward. A time server that only slews it
   /// also slews the other clocks.
   std::chrono::nanoseconds step{};
-  std::chrono::nanoseconds suspended{};  ///< how long the computer was suspended
+  std::chrono::nanoseconds suspended{};  ///< time for which the computer was suspended
 };
 [[nodiscard]] ClockChange change_between(const ClockReading& start, const ClockReading& now);
 

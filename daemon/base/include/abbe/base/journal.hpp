@@ -23,7 +23,7 @@ struct JournalField {
 
 struct JournalEntry {
   Urgency urgency = Urgency::Info;
-  std::string message;          ///< what happened, where, what to do
+  std::string message;          ///< text: what happened, where, and what to do
   std::string_view message_id;  ///< 32 hexadecimal digits, the same for every line of its kind
   std::vector<JournalField> fields = {};
 };

@@ -19,7 +19,7 @@ class LimitedLog {
   using Clock = std::chrono::steady_clock;
   using Write = std::function<void(const std::string& line)>;
   struct Limit {
-    std::size_t lines;  ///< of one subject, in each period
+    std::size_t lines;  ///< most lines of one subject in each period
     std::chrono::seconds period;
   };
   static constexpr std::size_t kMostSubjects = 1000;

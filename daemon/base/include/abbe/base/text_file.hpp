@@ -13,7 +13,7 @@ namespace abbe::daemon {
 /// process is killed by SIGBUS.
 [[nodiscard]] Result<std::string> read_text(const std::filesystem::path& file);
 
-/// As read_text(), but the file must be a regular file of at most 1 GiB. A pipe or a device is
+/// Same as read_text(), but the file must be a regular file of at most 1 GiB. A pipe or a device is
 /// BadInput; the call does not wait for it.
 [[nodiscard]] Result<std::string> read_regular_file(const std::filesystem::path& file);
 

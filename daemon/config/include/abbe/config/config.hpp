@@ -69,8 +69,9 @@ struct MachineConfig {
   /// the ranges, because home position and reflector are the same. Empty: every run has its own
   /// offset.
   std::string tracker_place{};
-  std::optional<TrackerVertical> tracker_vertical;          ///< nullopt: not levelled
-  std::optional<std::array<double, 3>> tracker_position_m;  ///< in machine axes, accurate to 0.5 m
+  std::optional<TrackerVertical> tracker_vertical;  ///< nullopt: not levelled
+  /// position in machine axes, accurate to 0.5 m
+  std::optional<std::array<double, 3>> tracker_position_m;
   [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
   friend bool operator==(const MachineConfig&, const MachineConfig&) = default;
 };
@@ -123,7 +124,7 @@ struct SensorsConfig {
   bool check = true;
   /// for this time the last good value is used instead of readings that are refused
   std::chrono::nanoseconds hold{std::chrono::seconds{60}};
-  /// after this time without a reading the history of a sensor is discarded
+  /// if a sensor gives no reading for this time, its history is discarded
   std::chrono::nanoseconds forget{std::chrono::minutes{10}};
   /// largest difference of a first reading from the median of scales and air
   double start_spread_K = 15.0;
@@ -162,10 +163,11 @@ struct RecordingConfig {
   std::uint32_t chunk_bytes = 256 * 1024;
   /// A chunk of the recording is closed after this time, even if it has not reached chunk_bytes.
   std::chrono::nanoseconds chunk_period{std::chrono::seconds{1}};
-  bool raw = true;  ///< also record the raw bytes of the devices
+  bool raw = true;  ///< true: also record the raw bytes of the devices
   /// If less disk space than this is free, recording stops; acquisition continues.
   std::uint64_t min_free_bytes = 256ull * 1024 * 1024;
-  std::uint64_t max_file_bytes = 4096ull * 1024 * 1024;  ///< then the next part begins; 0: no limit
+  /// when a file has this size, the next part begins; 0: no limit
+  std::uint64_t max_file_bytes = 4096ull * 1024 * 1024;
   /// Recordings older than this are removed, unless a model names them among its inputs; 0: never.
   std::chrono::hours keep{0};
 };
@@ -215,12 +217,12 @@ struct NestConfig {
 
 /// [otf]: calibration with a laser tracker along a path.
 struct OtfConfig {
-  OtfMode mode = OtfMode::OnTheFly;                     ///< unless a request names another one
-  double u_repeatability_m = 0.5e-6;                    ///< of one standstill, per component
-  OtfEstimator estimator = OtfEstimator::Simultaneous;  ///< of on-the-fly mode
+  OtfMode mode = OtfMode::OnTheFly;   ///< unless a request names another one
+  double u_repeatability_m = 0.5e-6;  ///< repeatability of one standstill, per component
+  OtfEstimator estimator = OtfEstimator::Simultaneous;  ///< estimator of on-the-fly mode
   OtfBacklash backlash = OtfBacklash::None;
   std::vector<NestConfig> nests{};
-  double u_nest_repeatability_m = 3e-6;  ///< of one visit of a nest, per coordinate
+  double u_nest_repeatability_m = 3e-6;  ///< repeatability of one visit of a nest, per coordinate
   /// Prior for smooth tables of X, Y and Z: bend over three nodes 50 mm apart. 0: no prior for this
   /// axis.
   std::optional<std::array<double, 3>> smoothness_m{};
@@ -247,7 +249,7 @@ struct DriftConfig {
 /// touched.
 struct ArtefactTemperatureConfig {
   std::optional<std::uint8_t> sensor;  ///< index into Config::temperatures
-  double fixed_K = 293.15;             ///< without a sensor
+  double fixed_K = 293.15;             ///< temperature if there is no sensor
   /// standard uncertainty: of the sensor, and of the array's temperature relative to the sensor
   double u_temperature_K = 0.0;
 };

@@ -47,7 +47,7 @@ void take_entries(MeaningEntries& entries, const MeaningEntries& other,
 [[nodiscard]] std::string number_text(double value);
 [[nodiscard]] std::string numbers_text(const std::vector<double>& values, double per_si);
 
-/// How two lists differ.
+/// The differences of two lists.
 struct MeaningDifference {
   /// Tables and elements that only one of the lists has: "[TABLE] was configured, is not".
   std::vector<std::string> tables;

@@ -14,8 +14,8 @@ namespace abbe::daemon {
 struct MtconnectConfig {
   std::string address = "127.0.0.1";  ///< numeric IPv4 or IPv6 address to listen on
   std::uint16_t port = 7878;          ///< 0: any free port, which abbe-mtconnect prints
-  /// This time is sent to an agent in "* PONG". The agent then sends "* PING" with this period.
-  /// Either side closes the connection if the other one is silent for twice this time.
+  /// The heartbeat, which is sent to an agent in "* PONG". The agent then sends "* PING" with this
+  /// period. Either side closes the connection if the other one is silent for twice this time.
   std::chrono::nanoseconds heartbeat = std::chrono::seconds{10};
 };
 

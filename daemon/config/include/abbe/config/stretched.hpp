@@ -15,10 +15,10 @@ namespace abbe::daemon {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(longer);
 }
 
-/// As stretched(), for the silence after which a device is faulty. The operating system may suspend
-/// a simulated device for longer than this silence, because the device shares the processors with
-/// other programs. At `speed` > 1 the result is therefore at least one second of the operating
-/// system's clock.
+/// Same as stretched(), but for the silence after which a device is faulty. The operating system
+/// may suspend a simulated device for longer than this silence, because the device shares the
+/// processors with other programs. At `speed` > 1 the result is therefore at least one second of
+/// the operating system's clock.
 [[nodiscard]] inline std::chrono::nanoseconds stretched_silence(std::chrono::nanoseconds silence,
                                                                 double speed) {
   constexpr std::chrono::nanoseconds kLongestPause = std::chrono::seconds{1};

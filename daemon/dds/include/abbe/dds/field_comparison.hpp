@@ -14,11 +14,12 @@ struct FieldComparison {
   struct Lengths {
     double mean_m = 0.0, max_m = 0.0;
   };
-  std::size_t points = 0;    ///< number of compared points
-  std::size_t outside = 0;   ///< points without a value in the field
-  Lengths before;            ///< |V_known|
-  Lengths after;             ///< |V_known - V_field|, datums unchanged
-  Lengths after_rigid_free;  ///< after removal of the best-fit rigid motion T + r x p
+  std::size_t points = 0;   ///< number of compared points
+  std::size_t outside = 0;  ///< points without a value in the field
+  Lengths before;           ///< |V_known|
+  Lengths after;            ///< |V_known - V_field|, datums unchanged
+  /// |V_known - V_field| after removal of the best-fit rigid motion T + r x p
+  Lengths after_rigid_free;
 };
 /// Compares `known_V_m` at `positions_m` with the field. DataInsufficient for fewer than 3 points
 /// inside the field, or all of them on a line.

@@ -24,7 +24,7 @@ inline constexpr int kReceivedInstances = 1024;
 /// The data that a PayloadType serializes: the encapsulation header and the CDR bytes.
 struct Payload {
   std::vector<std::byte> bytes;
-  bool received = false;  ///< by a reader of Fast DDS
+  bool received = false;  ///< true: received by a reader of Fast DDS
 };
 
 class PayloadType final : public eprosima::fastdds::dds::TopicDataType {

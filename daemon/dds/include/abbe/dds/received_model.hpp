@@ -51,7 +51,7 @@ class ReceivedModel {
   std::optional<v1::ModelState> state_;
   std::optional<v1::ErrorModel> model_;
   using Slices = std::map<std::uint32_t, v1::ErrorGrid>;
-  std::map<std::string, Slices> slices_;  // by model id
+  std::map<std::string, Slices> slices_;  // the slices, by model id
 };
 
 /// Whether this compensation vector may be applied. `delay`: the transit delay from Delay::of();

@@ -41,8 +41,8 @@ class MachineMotion {
   [[nodiscard]] virtual drivers::IppStop last_stop() const = 0;
   /// May be called from any thread; takes no lock. Stops the motion and ends the session.
   virtual void end() = 0;
-  /// As end(), but waits until the motion is stopped or until it is known that the stop cannot be
-  /// confirmed. Ends the device thread. No other function may be called afterwards.
+  /// Same as end(), but waits until the motion is stopped or until it is known that the stop cannot
+  /// be confirmed. Ends the device thread. No other function may be called afterwards.
   virtual drivers::IppStop finish() = 0;
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const = 0;
   [[nodiscard]] virtual Result<void> release() = 0;

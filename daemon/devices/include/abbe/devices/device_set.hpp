@@ -48,8 +48,8 @@ class DeviceSet final : public SampleSource {
   /// destroyed. The machine then needs no release (see release_machine()). May be called from any
   /// thread; takes no lock.
   void end_machine();
-  /// As end_machine(), but waits until the machine is stopped or until it is known that the stop
-  /// cannot be confirmed. No other function may be called afterwards. nullopt: no measuring
+  /// Same as end_machine(), but waits until the machine is stopped or until it is known that the
+  /// stop cannot be confirmed. No other function may be called afterwards. nullopt: no measuring
   /// machine.
   std::optional<drivers::IppStop> finish_machine();
   [[nodiscard]] std::optional<std::string> release_awaited() const override;

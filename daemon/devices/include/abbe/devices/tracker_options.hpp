@@ -15,7 +15,7 @@ namespace abbe::daemon {
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config,
                                                            double speed);
 
-/// As device_options(), for a tracker that sends its points as lines of text.
+/// Same as device_options(), for a tracker that sends its points as lines of text.
 [[nodiscard]] drivers::LineTrackerOptions line_options(const TrackerConfig& config, double speed);
 
 /// The options from the text of the configuration table of a tracker that sends lines of text.

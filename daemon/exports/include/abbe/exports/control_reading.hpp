@@ -21,8 +21,8 @@ struct ControlSettings {
   AxisPosition tool_m{};             ///< tool reference point to functional point
 };
 
-/// What the control adds to a commanded position, in m. `direction`: +1 forward, -1 backward, 0
-/// not known (the mean of both) for each axis. Thread-safe.
+/// The correction that the control adds to a commanded position, in m. `direction`: +1 forward, -1
+/// backward, 0 not known (the mean of both) for each axis. Thread-safe.
 using ControlCorrection = std::function<AxisPosition(const AxisPosition& commanded_m,
                                                      const std::array<int, 3>& direction)>;
 

@@ -21,7 +21,7 @@ enum class ExportFormat {
   CsvGrid
 };
 
-/// Which part of a correction a file of the format can contain.
+/// The part of a correction that a file of the format can contain.
 enum class HeldPart {
   Errors,        ///< the error tables of a machine, rotations with levers
   Positioning,   ///< a table for each axis, a function of its own position

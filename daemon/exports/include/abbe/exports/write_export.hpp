@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// What a file states about its origin, where the format has comments.
+/// Texts about the origin of a file. The file contains them if its format has comments.
 struct ExportOrigin {
   std::string model_hash, machine, volume, tool, direction;
   /// the lines of statements_of_use(): verdict, and who forced the export and why
@@ -18,7 +18,7 @@ struct ExportOrigin {
 
 struct WriteOptions {
   std::array<std::string, 3> axis_names{"X", "Y", "Z"};
-  int positive_moves = 1;  ///< as FormatFacts::positive_moves, or given by the user
+  int positive_moves = 1;  ///< same as FormatFacts::positive_moves, or given by the user
   ExportOrigin origin;
 };
 

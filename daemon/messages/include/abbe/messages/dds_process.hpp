@@ -14,9 +14,9 @@
 
 namespace abbe::daemon {
 
-/// How abbe-dds ended.
+/// The way in which abbe-dds ended.
 struct DdsEnd {
-  int wait_status = 0;  ///< of waitpid()
+  int wait_status = 0;  ///< status from waitpid()
   bool hung = false;    ///< abbed killed abbe-dds because it did not answer
   std::chrono::system_clock::time_point when{};
 

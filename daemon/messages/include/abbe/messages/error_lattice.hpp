@@ -15,7 +15,7 @@ namespace abbe::daemon {
 struct LatticeNode {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d V_m = Eigen::Vector3d::Zero();
-  bool inside = true;  ///< in the validity volume of the model
+  bool inside = true;  ///< true: the node is in the validity volume of the model
 };
 
 /// Interpolates V between the nodes, linearly in x, y and z. A cell has a value only if all its
@@ -30,8 +30,8 @@ class ErrorLattice {
 
  private:
   std::array<std::vector<double>, 3> coordinates_m_;
-  std::vector<Eigen::Vector3d> V_m_;  ///< by x, then y, then z; z varies fastest
-  std::vector<bool> inside_;          ///< same order as V_m_
+  std::vector<Eigen::Vector3d> V_m_;  ///< values sorted by x, then y, then z; z varies fastest
+  std::vector<bool> inside_;          ///< elements in the same order as V_m_
 };
 
 }  // namespace abbe::daemon

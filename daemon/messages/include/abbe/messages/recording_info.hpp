@@ -12,9 +12,9 @@
 
 namespace abbe::daemon {
 
-/// What the three metadata records of a recording contain: MCAP records "abbe.recording" (machine,
-/// utc_offset_ns, speed, part, follows), "abbe.configuration" (text, sha256) and "abbe.versions".
-/// Each record has an entry entries_sha256, a hash over its other entries.
+/// The contents of the three metadata records of a recording: MCAP records "abbe.recording"
+/// (machine, utc_offset_ns, speed, part, follows), "abbe.configuration" (text, sha256) and
+/// "abbe.versions". Each record has an entry entries_sha256, a hash over its other entries.
 struct RecordingInfo {
   std::string machine;
   protocol::UtcOffset utc_offset;  ///< UTC in the file = host time + utc_offset

@@ -56,7 +56,7 @@ struct PayloadKey {
   /// The bytes of the payload from after its header to the end of the key. Payloads with equal
   /// bytes belong to the same DDS instance.
   std::span<const std::byte> bytes;
-  std::string_view machine;              ///< without its NUL
+  std::string_view machine;              ///< machine name without its NUL
   std::optional<std::string_view> text;  ///< for MachineAndText: the second text
   std::optional<std::uint32_t> number;   ///< for MachineAndNumber: the number
 };

@@ -79,7 +79,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// Ends a running session as refused; what was acquired stays in the recording. Refused if there
   /// is no session, and while a model is being stored.
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
-  /// As cancel(), but for the time in which a model is being stored and the store does not answer.
+  /// Same as cancel(), but for the time in which a model is being stored and the store does not
+  /// answer.
   [[nodiscard]] Result<void> give_up_store(std::string who, protocol::HostTime now);
 
   void take(const protocol::Snapshot& snapshot);
@@ -111,7 +112,7 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// The store does not answer. As store_failed(), but the caller still waits for the answer of the
   /// store.
   void store_stalls(std::string fault, std::string_view advice, protocol::HostTime now);
-  /// After store_failed(): the caller stores the model again.
+  /// Call it after store_failed(), when the caller stores the model again.
   void store_again(protocol::HostTime now) { (void)go(SessionStep::StoreAgain, now); }
   /// The model is stored with its verdict.
   void judged(std::string model_id, bool passed, std::string reason, SessionVerdict verdict,
@@ -133,8 +134,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// The last kEndedKept sessions before the present one, oldest first, so that a client can still
   /// read the verdict on its session.
   [[nodiscard]] const std::deque<SessionStatus>& ended() const noexcept { return ended_; }
-  /// Why an identified model is not stored yet: "model 0123... is not stored: write ...: No space
-  /// left on device". Empty: there is no such model.
+  /// The reason why an identified model is not stored yet: "model 0123... is not stored: write ...:
+  /// No space left on device". Empty: there is no such model.
   [[nodiscard]] const std::string& not_stored() const noexcept { return not_stored_; }
   /// Held-out residuals of the last identified model, also of an earlier session; nullopt before
   /// the first.

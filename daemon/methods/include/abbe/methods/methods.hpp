@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-using Methods = MethodList<OtfMethod,    // on the fly, with a laser tracker
+using Methods = MethodList<OtfMethod,    // calibration on the fly, with a laser tracker
                            EvemuMethod,  // touches of a ball array
                            MfbMethod>;   // touches of a Multi-Feature Bar
 

@@ -28,15 +28,15 @@ struct ConfigurationFit {
     Other,
   };
   Kind kind = Kind::Other;
-  /// Why the model is not valid for this configuration, with the keys that differ; empty: it is
-  /// valid.
+  /// The reason why the model is not valid for this configuration, with the keys that differ;
+  /// empty: it is valid.
   std::string sentence{};
 };
 [[nodiscard]] ConfigurationFit fit_of(const ModelDocument& document,
                                       const PresentConfiguration& present);
 
-/// Why the model must not be applied with this configuration. Empty: it was made for this
-/// configuration, or an earlier version of abbe made it and a person accepted it for this
+/// The reason why the model must not be applied with this configuration. Empty: it was made for
+/// this configuration, or an earlier version of abbe made it and a person accepted it for this
 /// configuration. `accepted_configuration`: the hash that its activation states.
 [[nodiscard]] std::string unfit_for(const ModelDocument& document,
                                     const PresentConfiguration& present,

@@ -66,7 +66,7 @@ struct IdentityEvent {
 struct MachineIdentity {
   std::string machine_id;  ///< UUID, 36 characters
   ComputerMarks computer;
-  std::vector<IdentityEvent> events;  ///< in order; the first is Made
+  std::vector<IdentityEvent> events;  ///< events in order; the first is Made
 
   /// The last event in which a person decided that this machine is not the machine from which the
   /// data folder comes. Null: there is none.

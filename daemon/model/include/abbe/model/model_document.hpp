@@ -94,9 +94,9 @@ struct ModelDocument {
   /// Thermal expansion of the ball array for which the touches were corrected; nullopt: not
   /// corrected.
   std::optional<calib::Expansion> artefact{};
-  /// What is missing in the recording of the run. Empty if the recording is complete, or if
-  /// recording was switched off. A gap does not affect the uncertainty of the model, but no replay
-  /// can check such a model.
+  /// The part that is missing in the recording of the run. Empty if the recording is complete, or
+  /// if recording was switched off. A gap does not affect the uncertainty of the model, but no
+  /// replay can check such a model.
   std::string recording_gap{};
   /// Method otf only: "on-the-fly" or "standstill". Empty for other methods and in files of earlier
   /// versions.

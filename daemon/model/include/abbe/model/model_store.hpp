@@ -51,7 +51,7 @@ struct StoreEntry {
   protocol::UtcTime added{};
   std::string method, machine;      ///< empty if the file cannot be read
   std::vector<std::string> inputs;  ///< names of the files from which the model was made
-  std::string fault;                ///< why the file cannot be read; empty: readable
+  std::string fault;                ///< reason why the file cannot be read; empty: readable
   std::optional<bool> simulated{};  ///< made_on_simulated_devices()
 };
 
@@ -125,7 +125,8 @@ class ModelStore {
   /// gate on that model, `accepted_configuration` the last one that the store has for it. Reads
   /// state.json at every call. nullopt: no model is active.
   [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
-  /// What has drifted since the last activation, as add_drift() recorded it last; empty: nothing.
+  /// The tables that have drifted since the last activation, as add_drift() recorded them last;
+  /// empty: none.
   [[nodiscard]] Result<std::string> drift() const;
   [[nodiscard]] Result<ModelDocument> load(const std::string& id) const;
   /// True if the file of model `id` has exactly the bytes of to_json(document): load() would then

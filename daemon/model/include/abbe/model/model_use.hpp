@@ -20,8 +20,9 @@ enum class ModelPurpose { Control, Certificate, Look };
 
 /// A model, with information that its document does not contain.
 struct ModelInUse {
-  const ModelDocument& document;         ///< with the verdict of its file or store
-  std::span<const StoreEvent> events{};  ///< of this model, oldest first; empty: it is in no store
+  const ModelDocument& document;  ///< document with the verdict of its file or store
+  /// events of this model, oldest first; empty: the model is in no store
+  std::span<const StoreEvent> events{};
   /// machine_hash() of the configuration of the machine that will use the model; nullopt: not
   /// known.
   std::optional<std::string> machine_hash{};

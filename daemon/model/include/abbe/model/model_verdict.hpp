@@ -26,7 +26,7 @@ struct ModelVerdict {
   bool accepted = false;             ///< true: the gate accepted the model
   std::vector<std::string> reasons;  ///< reasons of a refusal
   std::vector<std::string> notes{};  ///< remarks that are no reasons against the model
-  /// Who activated the model although the gate had refused it, and why.
+  /// The person who activated the model although the gate had refused it, and the reason.
   std::optional<StoreActor> forced{};
   friend bool operator==(const ModelVerdict&, const ModelVerdict&) = default;
 };

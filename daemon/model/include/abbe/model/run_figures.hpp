@@ -80,13 +80,14 @@ struct RunFigures {
   static constexpr double kMostSigmas = 5.0;
   static constexpr std::size_t kSigmaIntervals = 40;
 
-  std::string held_out;  ///< what was excluded from the fit: "legs", "positions", "points"
+  /// observations that were excluded from the fit: "legs", "positions", "points"
+  std::string held_out;
   double held_out_before_m = 0.0, held_out_after_m = 0.0;  ///< rms
   /// Notes of the verdict, only in models of earlier versions; else see ModelVerdict::notes.
   std::vector<std::string> notes;
   std::vector<Interval> residuals;  ///< for a run along a path, else empty
-  /// Where the run measured, as polylines of scale readings: the path of each run, the balls of
-  /// each position of an array, the bar in each of its positions.
+  /// The places of the measurement, as polylines of scale readings: the path of each run, the balls
+  /// of each position of an array, the bar in each of its positions.
   std::vector<std::vector<calib::Vector3>> places_m{};
   std::string part_kind{};  ///< "leg", "position", "measurement"
   std::vector<Part> parts{};

@@ -20,13 +20,14 @@ struct ShdrServerOptions {
   std::string address = "127.0.0.1";  ///< numeric IP address
   std::uint16_t port = 7878;          ///< 0: any free port
   std::chrono::milliseconds heartbeat = std::chrono::seconds{10};
-  /// At the limit a further client replaces the oldest one that never sent "* PING", which is not
-  /// an agent; if there is none, the further client is refused.
+  /// Most clients. If there are that many, a further client replaces the oldest client that never
+  /// sent "* PING", because such a client is not an agent. If there is none, the further client is
+  /// refused.
   std::size_t clients = 16;
   /// A client is disconnected if more than this number of bytes wait for it, or if it has read
   /// nothing for two heartbeats while bytes wait.
   std::size_t unsent_bytes = 256u << 10;
-  int socket_buffer_bytes = 64 << 10;  ///< of the kernel, for each client
+  int socket_buffer_bytes = 64 << 10;  ///< send buffer of the kernel for each client
   /// Most bytes that a client may send in one second. An agent sends 7 in each heartbeat.
   std::size_t received_bytes_per_s = 16u << 10;
 };
@@ -61,7 +62,7 @@ class ShdrServer {
     Clock::time_point second_began;  ///< start of the second in which `received` counts
     std::size_t received = 0;        ///< bytes in this second
     std::string inbox{}, outbox{};
-    std::string fault{};  ///< why the client must be disconnected; empty: it stays connected
+    std::string fault{};  ///< reason why the client must be disconnected; empty: it stays connected
   };
 
   ShdrServer(ShdrServerOptions options, Greeting greeting, Log log, daemon::FileDescriptor listener,

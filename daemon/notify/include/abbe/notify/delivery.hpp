@@ -33,7 +33,7 @@ class Delivery {
   /// delivered.
   ~Delivery();
 
-  void push(Notification notification);  ///< never waits for the receiver
+  void push(Notification notification);  ///< adds a notification; never waits for the receiver
 
  private:
   void run();

@@ -25,7 +25,7 @@ struct Event {
   NotifyKind kind = NotifyKind::NotReachable;
   Phase phase = Phase::Happened;
   Severity severity = Severity::Info;
-  std::string subject{};      ///< what the event is about: a device, "model", "calibration 3"
+  std::string subject{};      ///< the subject of the event: a device, "model", "calibration 3"
   std::string text{};         ///< the text that status and page also show
   std::string model_id{};     ///< empty: the event concerns no model
   std::uint64_t session = 0;  ///< number of the calibration; 0: none

@@ -37,7 +37,7 @@ class StateChanges {
     std::string text{};
     std::string model_id{};
   };
-  using AllLasting = std::map<std::string, Lasting>;  ///< by subject
+  using AllLasting = std::map<std::string, Lasting>;  ///< states by subject
 
   [[nodiscard]] std::vector<Event> answered(const nlohmann::json& status, Moment now);
   [[nodiscard]] std::vector<Event> away(const std::string& fault, Moment now);
@@ -51,7 +51,7 @@ class StateChanges {
   std::optional<int> process_;  ///< process id of the abbed that answered last
   bool first_answer_ = true;    ///< true: no answer has been evaluated since this object was made
   std::uint64_t last_session_ = 0;  ///< highest number of a calibration that has ended
-  std::string demand_, release_;    ///< what a person was last asked to do
+  std::string demand_, release_;    ///< the last requests to a person
   bool had_model_ = false;
   AllLasting lasting_;  ///< states that were reported
   Steady settled_at_{};

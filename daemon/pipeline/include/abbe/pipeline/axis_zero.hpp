@@ -42,7 +42,7 @@ struct ZeroState {
 
 class AxisZeros {
  public:
-  /// How axes without reference marks are treated. NeedAZero: they are not referenced until the
+  /// The treatment of axes without reference marks. NeedAZero: they are not referenced until the
   /// operator states their zero. Untouched: their readings are not changed, as in recordings
   /// without kZeroRule.
   enum class WithoutMarks { NeedAZero, Untouched };

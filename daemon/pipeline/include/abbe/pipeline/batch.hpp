@@ -36,7 +36,8 @@ struct Batch {
   protocol::HostTime taken{};
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;
-  std::vector<protocol::EnvironmentSample> environment;  ///< from the tracker's weather station
+  /// samples from the tracker's weather station
+  std::vector<protocol::EnvironmentSample> environment;
   std::vector<FromEnvironment> measured_environment;
   std::vector<protocol::ProbeTrigger> touches;
   std::vector<protocol::TouchScan> touch_scans;

@@ -54,7 +54,7 @@ struct CountingState {
 /// counting is checked later, when the card reports its counts.
 struct LeftCounting {
   std::optional<CountingState> state;
-  std::string warning;  ///< why there is no state; empty if there is no file
+  std::string warning;  ///< reason why there is no state; empty if there is no file
 };
 /// Reads DATA_DIR/counting-state.json for `config`. A file that cannot be used is renamed to
 /// counting-state.json.damaged; half-written files are removed. If no axes are counted, the result

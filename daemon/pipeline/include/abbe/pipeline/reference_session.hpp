@@ -49,7 +49,8 @@ struct AxisReference {
   /// reading (m or rad) at count 0 of the live counter, relative to the zero mark of the scale
   double offset = 0.0;
   double u_offset = 0.0;
-  std::string reason;  ///< why the latest mark did not give the zero, or why the search failed
+  /// reason why the latest mark did not give the zero, or why the search failed
+  std::string reason;
 };
 
 class ReferenceSession {

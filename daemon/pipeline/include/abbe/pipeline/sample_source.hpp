@@ -51,8 +51,8 @@ class SampleSource {
   /// The latest request to stop that the machine's driver has received, and its outcome. May be
   /// called from any thread.
   [[nodiscard]] virtual drivers::IppStop machine_stop() const { return {}; }
-  /// Why the measuring machine does not move until the operator releases it; nullopt: the machine
-  /// awaits no release.
+  /// The reason why the measuring machine does not move until the operator releases it; nullopt:
+  /// the machine awaits no release.
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const { return std::nullopt; }
   /// Releases the measuring machine: clears its errors and starts a new session with its server.
   /// Refused if no release is awaited.

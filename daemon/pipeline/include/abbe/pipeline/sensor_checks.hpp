@@ -32,7 +32,7 @@ struct SensorFinding {
   std::string text;
 };
 
-/// How often the readings of a sensor began to be refused since the start.
+/// Number of times that the readings of a sensor began to be refused since the start.
 struct SensorDoubts {
   std::string device;
   std::uint64_t count = 0;  ///< number of times a doubt about the sensor began
@@ -109,7 +109,8 @@ class SensorChecks {
     /// the first reading is not compared with other sensors, because a person accepted the sensor
     bool accepted = false;
     calib::SensorDoubt doubt = calib::SensorDoubt::None;
-    double reading = kNone, lowest = kNone, highest = kNone;  ///< at the beginning of the doubt
+    /// values at the beginning of the doubt
+    double reading = kNone, lowest = kNone, highest = kNone;
     std::uint64_t doubts = 0;
     std::chrono::nanoseconds latest{};  ///< instant at which the latest doubt began
     std::string latest_text = {};

@@ -38,8 +38,8 @@ class SensorQueue {
   /// than kMostAhead is not used and counts as a doubt.
   void add(std::size_t device, const protocol::EnvironmentSample& sample,
            protocol::EnvironmentMask mask, protocol::HostTime taken);
-  /// As add(), for a sample of the tracker's weather station. It is due at `taken`, or at its own
-  /// instant if `taken` is not known.
+  /// Same as add(), for a sample of the tracker's weather station. The sample is due at `taken`, or
+  /// at its own instant if `taken` is not known.
   void add_weather(std::size_t device, const protocol::EnvironmentSample& sample,
                    protocol::EnvironmentMask mask, protocol::HostTime taken);
 
@@ -71,7 +71,8 @@ class SensorQueue {
   SensorChecks checks_;
   std::chrono::nanoseconds lag_;
   std::vector<Waiting> waiting_;
-  std::vector<SensorAcceptance> acceptances_;  ///< not applied yet, ordered by time
+  /// acceptances that are not applied yet, ordered by time
+  std::vector<SensorAcceptance> acceptances_;
 };
 
 }  // namespace abbe::daemon

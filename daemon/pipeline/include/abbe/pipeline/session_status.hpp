@@ -91,27 +91,30 @@ struct StartState {
 
 /// The verdict of the gate on the model of a session, in sentences.
 struct SessionVerdict {
-  std::string figures;               ///< the held-out residuals
-  std::vector<std::string> reasons;  ///< why the model is refused or not activated; empty: accepted
-  std::vector<std::string> notes;    ///< remarks that are no reasons against the model
+  std::string figures;  ///< the held-out residuals
+  /// reasons why the model is refused or not activated; empty: accepted
+  std::vector<std::string> reasons;
+  std::vector<std::string> notes;  ///< remarks that are no reasons against the model
 };
 
 struct SessionStatus {
   std::uint64_t id = 0;  ///< number of the session in this process, from 1; 0: none yet
   SessionState state = SessionState::Idle;
   std::string method = "otf";
-  std::string reason;  ///< why the session is in this state, or what the operator must do now
+  /// reason why the session is in this state, or the action that the operator must take now
+  std::string reason;
   /// in state Refused: the kind of error, for the exit code of the client
   ErrorCode refused_as = ErrorCode::DataInsufficient;
   double progress = 0.0;  ///< progress of the work in this state, 0 to 1
   std::size_t points = 0;
   /// in state Acquiring: estimated time to the end of this state, in host time
   std::optional<std::chrono::nanoseconds> remaining{};
-  std::optional<StartState> start{};  ///< in state Warming of a run along a path
+  std::optional<StartState> start{};  ///< set in state Warming of a run along a path
   /// Tables of the run so far; null: there are none yet. Shared with replies that other threads
   /// write; never changed.
   std::shared_ptr<const LiveTables> live{};
-  std::optional<SessionVerdict> verdict{};  ///< in states Active and Refused, if there is a model
+  /// set in states Active and Refused, if there is a model
+  std::optional<SessionVerdict> verdict{};
   /// in state Refused: the command that identifies the recorded run again with other options;
   /// empty: nothing was identified, or the run is not recorded
   std::string again{};

@@ -30,7 +30,7 @@ class DdsSupervisor {
 
   struct Options {
     std::filesystem::path program;       ///< path of abbe-dds
-    std::vector<std::string> arguments;  ///< without argv[0]
+    std::vector<std::string> arguments;  ///< arguments without argv[0]
     int priority = 0;                    ///< SCHED_FIFO; 0, or not permitted: SCHED_OTHER
     /// If the child ran for this time, it is restarted without delay.
     std::chrono::milliseconds steady_after{2000};
@@ -58,10 +58,10 @@ class DdsSupervisor {
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }  ///< 0: not running
   [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
-  /// How the last child ended; nullopt: none has ended yet.
+  /// The way in which the last child ended; nullopt: none has ended yet.
   [[nodiscard]] const std::optional<DdsEnd>& last_end() const noexcept { return last_end_; }
-  /// Why the last attempt to start the child failed; further attempts follow. Empty: the last
-  /// attempt succeeded.
+  /// The reason why the last attempt to start the child failed; further attempts follow. Empty: the
+  /// last attempt succeeded.
   [[nodiscard]] const std::string& start_fault() const noexcept { return start_fault_; }
 
  private:

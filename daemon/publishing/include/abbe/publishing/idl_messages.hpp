@@ -29,7 +29,7 @@ struct PublishedModel {
   std::string hash = {};  ///< model_hash() of the document
   /// The largest U(V), k = 2, of calib::iso::volume_error(); nullopt: it cannot be computed.
   std::optional<double> largest_U_m = {};
-  bool simulated = false;                                 ///< its data came from simulated devices
+  bool simulated = false;  ///< true: simulated devices measured its data
   std::optional<calib::TrackerPlace> tracker_place = {};  ///< not published; needed for updates
   calib::VolumetricModel model;
 };

@@ -43,8 +43,8 @@ struct ActiveModelState {
   const PublishedModel* model = nullptr;
   const ModelPublication* publication = nullptr;  ///< encoded messages of `model`
   std::uint64_t revision = 0;                     ///< changes whenever another model becomes active
-  /// Why the gate refused a model that a person has nevertheless activated; empty: the gate
-  /// accepted it.
+  /// The reason why the gate refused a model that a person has nevertheless activated; empty: the
+  /// gate accepted it.
   std::string refused{};
 };
 
@@ -70,7 +70,8 @@ class Publisher {
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);
   void event(const SessionEvent& event);
 
-  /// Why the last message that was not sent could not be encoded; empty: all were encoded.
+  /// The reason why the last message that was not sent could not be encoded; empty: all were
+  /// encoded.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
   [[nodiscard]] const DdsLink& link() const noexcept { return link_; }
   [[nodiscard]] const PublishedIdentity& identity() const noexcept { return options_.identity; }

@@ -14,10 +14,10 @@
 namespace abbe::daemon {
 
 struct LeftRecording {
-  std::filesystem::path file;  ///< its present name
+  std::filesystem::path file;  ///< present name of the file
   /// number of messages in the index of the file; 0: the file was empty and was removed
   std::uint64_t messages = 0;
-  std::string fault;  ///< why the file was not closed; empty: it is closed
+  std::string fault;  ///< reason why the file was not closed; empty: it is closed
 };
 
 /// Closes the recordings abbe-*.mcap.part in `directory`, except those of the run `running` and

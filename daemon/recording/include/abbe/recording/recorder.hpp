@@ -52,19 +52,20 @@ namespace abbe::daemon {
 
 struct RecorderOptions {
   std::filesystem::path directory;
-  std::string name;  ///< without extension; neither NAME.mcap nor NAME.mcap.part may exist
+  /// file name without extension; neither NAME.mcap nor NAME.mcap.part may exist
+  std::string name;
   /// A chunk is closed at this size or age; a failure loses at most one chunk.
   std::size_t chunk_bytes = std::size_t{1024} * 1024;
   std::chrono::nanoseconds chunk_period = std::chrono::milliseconds{500};
   std::chrono::nanoseconds sync_period = std::chrono::seconds{1};
   std::chrono::nanoseconds retry_period =
-      std::chrono::seconds{5};       ///< after the disk was full or failed
+      std::chrono::seconds{5};       ///< pause after the disk was full or failed
   std::uint64_t min_free_bytes = 0;  ///< the disk counts as full if less than this is free
   std::uint64_t max_file_bytes = 0;  ///< approximate; 0: no limit
   /// Sensors of the live run: a further file begins with the state of their checks.
   SensorCheckOptions sensors;
   std::string weather_station;  ///< name of the tracker whose weather station sends readings
-  /// as AssemblerOptions::watermark
+  /// same value as AssemblerOptions::watermark
   std::chrono::nanoseconds watermark = std::chrono::milliseconds{600};
 };
 
@@ -86,7 +87,7 @@ struct RecorderStatus {
   std::uint32_t files = 0;     ///< number of files begun
   std::uint64_t bytes = 0;     ///< written to the present file in whole chunks
   std::uint64_t chunks = 0;    ///< written to all files
-  std::uint64_t messages = 0;  ///< in those chunks
+  std::uint64_t messages = 0;  ///< messages in these chunks
   std::uint64_t lost = 0;      ///< messages passed to record() that are in no file
   /// messages not recorded because they exceed the bounds of the IDL (a device name > 32
   /// characters)

@@ -22,7 +22,7 @@ namespace abbe::daemon {
 
 struct RecorderThreadOptions {
   RecorderOptions recorder;
-  DeviceNames devices;  ///< as in the recording
+  DeviceNames devices;  ///< names of the devices in the recording
   bool raw = true;      ///< true: also record the raw bytes of the devices
   /// The default is enough for two minutes of a stalled disk with axes at 1 kHz and a tracker at
   /// 500 Hz. The size is limited because the memory may be locked.

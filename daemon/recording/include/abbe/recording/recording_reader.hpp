@@ -40,7 +40,7 @@ enum class MetadataCheck : std::uint8_t {
 /// A damaged part: "cut off at byte 4711, inside a chunk: 12 of its messages could be read".
 struct RecordingLoss {
   std::uint64_t offset = 0;  ///< position of the damaged part in the file
-  std::uint64_t bytes = 0;   ///< its length
+  std::uint64_t bytes = 0;   ///< length of the damaged part
   std::string what;
   /// True if data within the recording are missing or wrong. False if only the end is missing, as
   /// after a kill or a power cut, or only an index is damaged; all other data are then undamaged.
@@ -51,7 +51,8 @@ struct RecordingLoss {
 struct RecordedMessage {
   std::string_view topic;  ///< "abbe/v1/TrackerPoint"
   // Host times of the message, computed as the UTC dates in the file minus the recorded offset.
-  protocol::HostTime taken;  ///< when the hub took it; the same for all messages of a cycle
+  /// time at which the hub took it; the same for all messages of a cycle
+  protocol::HostTime taken;
   /// The instant that the message describes; for a message repeated from the previous file, the
   /// beginning of this file.
   protocol::HostTime published;

@@ -67,8 +67,8 @@ struct ReplayedZero {
 
 struct ReplayReport {
   std::vector<ReplayedCalibration> calibrations;
-  std::vector<ReplayedZero> zeros;          ///< from raw bytes only
-  std::vector<std::string> live_model_ids;  ///< from the calibration events in the recording
+  std::vector<ReplayedZero> zeros;          ///< filled only in a replay from raw bytes
+  std::vector<std::string> live_model_ids;  ///< ids from the calibration events in the recording
   std::uint64_t snapshots = 0;
   std::uint64_t samples = 0;  ///< number of samples of all devices, recorded or decoded from bytes
   std::uint64_t undecodable = 0;        ///< messages that could not be decoded

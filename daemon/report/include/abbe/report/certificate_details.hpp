@@ -38,8 +38,8 @@ struct ToleranceDetails {
 /// The independent measurement of a verification. Its file of points does not contain these
 /// entries.
 struct VerificationDetails {
-  std::string date{};           ///< as in ISO 8601, local
-  std::string operator_name{};  ///< who made the measurement
+  std::string date{};           ///< local date as in ISO 8601
+  std::string operator_name{};  ///< person who made the measurement
   std::optional<double> temperature_C{};
   /// Standard uncertainty of each coordinate of a measured point, k = 1. Required if a limit is
   /// given.

@@ -18,7 +18,7 @@ struct CertifiedValue {
   std::string value;                  ///< decimal number; empty: not estimable
   std::string U{};                    ///< empty: no uncertainty is stated
   bool is_angle = false;              ///< true: urad; false: um
-  std::string why{};                  ///< why the value is not estimable
+  std::string why{};                  ///< reason why the value is not estimable
   double value_si = 0.0, u_si = 0.0;  ///< m or rad, not rounded; u: k = 1
 };
 

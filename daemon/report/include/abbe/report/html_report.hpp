@@ -43,7 +43,7 @@ struct Histogram {
   /// Adds the counts expected of a normal distribution with mean 0 and this standard deviation, for
   /// the values of the first series.
   std::optional<double> normal_sd{};
-  bool wide = false;  ///< as wide as the page
+  bool wide = false;  ///< true: the chart is as wide as the page
 };
 
 /// Vectors in a plane: each is a line that begins at a dot and has `magnification` times the length

@@ -16,8 +16,8 @@ namespace abbe::daemon {
 /// best to all observations held out together with it is subtracted (calib/otf/judge/judge.hpp).
 struct LeftError {
   calib::Vector3 axis_position_m = calib::Vector3::Zero();
-  double before_m = 0.0;  ///< without compensation
-  double after_m = 0.0;   ///< with the model
+  double before_m = 0.0;  ///< error without compensation
+  double after_m = 0.0;   ///< error with the model
   double sigma_m = 0.0;   ///< standard uncertainty of the observation
 };
 

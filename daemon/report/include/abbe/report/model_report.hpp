@@ -18,7 +18,7 @@ namespace abbe::daemon {
 struct ReportSubject {
   ModelDocument document;
   std::optional<StoreEntry> entry{};  ///< nullopt: the model is in a file and not in a store
-  std::vector<StoreEvent> events{};   ///< of this model, oldest first
+  std::vector<StoreEvent> events{};   ///< events of this model, oldest first
   CertificateDetails details{};
   std::optional<std::string> machine_hash{};  ///< see ModelInUse::machine_hash
   /// Set if a certificate of the model was made although the model must not be used: who had it

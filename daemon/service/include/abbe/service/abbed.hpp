@@ -16,7 +16,7 @@
 
 namespace abbe::daemon {
 
-/// How abbed was started.
+/// Circumstances of the start of abbed.
 struct AbbedOptions {
   std::string configuration_text;  ///< text of the configuration file; stored in the recording
   std::string dds_program;  ///< path of abbe-dds; started as a child if dds.supervise is Child

@@ -74,8 +74,8 @@ class RunningWork {
 };
 }  // namespace detail
 
-/// As run_in_background(), for work that may still run when the program exits. `work` must refer
-/// only to objects that it owns.
+/// Same as run_in_background(), for work that may still run when the program exits. `work` must
+/// refer only to objects that it owns.
 template <class Work>
 [[nodiscard]] auto run_abandonable(Work work) -> std::future<std::invoke_result_t<Work&>> {
   return run_in_background(

@@ -111,7 +111,7 @@ class CalibrationService {
   LiveTablesWatch live_tables_;
   std::future<Result<KeptModel>> task_;  // identifies and stores a model, or stores a model again
   std::shared_ptr<IdentificationLink> link_;  // connection to the last identification
-  std::shared_ptr<JudgedModel> model_;        // to be stored; shared with the storing thread
+  std::shared_ptr<JudgedModel> model_;  // model that must be stored; shared with the storing thread
   // revision of the model authority at the start of storing
   std::uint64_t revision_before_storing_ = 0;
   std::string again_;           // the command that identifies the last identified run again

@@ -82,8 +82,8 @@ struct ControlVerb {
     Hub& hub, const nlohmann::json& request, const ControlPeer& peer,
     std::chrono::milliseconds time_out = std::chrono::seconds{3});
 
-/// As answer_request(), but executes all steps on the calling thread. For a hub without its own
-/// thread.
+/// Same as answer_request(), but executes all steps on the calling thread. For a hub without its
+/// own thread.
 [[nodiscard]] nlohmann::json answer_on_hub(const Hub& hub, const nlohmann::json& request,
                                            const ControlPeer& peer);
 

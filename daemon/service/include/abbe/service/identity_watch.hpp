@@ -23,8 +23,8 @@ class IdentityWatch {
 
   struct Known {
     std::string machine_id;  ///< empty: the identity could neither be read nor made
-    std::string doubt;       ///< why no model may be ACTIVE; empty: the identity is confirmed
-    std::string fault;       ///< why the identity could not be read or made
+    std::string doubt;  ///< reason why no model may be ACTIVE; empty: the identity is confirmed
+    std::string fault;  ///< reason why the identity could not be read or made
     std::vector<std::string> others{};  ///< models_of_other_machine()
   };
 
@@ -36,7 +36,8 @@ class IdentityWatch {
   void follow(WallTime now);
 
   [[nodiscard]] const Known& known() const noexcept { return known_; }
-  /// Why model `id` may be used neither for correction nor to judge a run; empty: it may be used.
+  /// The reason why model `id` may be used neither for correction nor to judge a run; empty: it may
+  /// be used.
   [[nodiscard]] std::string objection_to(const std::string& id) const;
   /// Changes the status from ACTIVE or DRIFT to STALE if the identity does not allow it.
   void restrict(ActiveModelState& state) const;

@@ -34,7 +34,7 @@ class JournalThread {
   std::chrono::milliseconds period_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  bool stopping_ = false;  // under mutex_
+  bool stopping_ = false;  // guarded by mutex_
   std::thread thread_;
 };
 

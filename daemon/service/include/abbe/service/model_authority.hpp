@@ -63,7 +63,8 @@ class ModelAuthority {
   ///   model_state() and fault(), and read again.
   Following follow_store(protocol::HostTime now);
   static constexpr std::chrono::seconds kStoreTimeout{5};
-  /// Why the last attempt to read the store, or its active model, failed. Empty if both were read.
+  /// The reason why the last attempt to read the store, or its active model, failed. Empty if both
+  /// were read.
   [[nodiscard]] const std::string& fault() const noexcept {
     return fault_.empty() ? active_.fault : fault_;
   }
@@ -94,7 +95,7 @@ class ModelAuthority {
   struct Look {
     StoreStamp stamp;
     std::optional<ActiveModel> active = {};  ///< nullopt: not read, because the stamp is unchanged
-    std::string fault = {};                  ///< why the store could not be read
+    std::string fault = {};                  ///< reason why the store could not be read
   };
   void begin_to_look(protocol::HostTime now);
   Following conclude_look(Result<Look> look, protocol::HostTime now);

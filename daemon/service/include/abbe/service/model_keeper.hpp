@@ -29,8 +29,8 @@ struct ActiveModel {
   StoreEvent activation;  ///< default-constructed: no model has been activated
   std::shared_ptr<const PublishedModel> model;
   ModelPublication publication;  ///< encoded messages of `model`
-  /// Why the readings do not have the meaning that they had when the model was made. Empty: they
-  /// have this meaning, or a person accepted the model for this configuration.
+  /// The reason why the readings do not have the meaning that they had when the model was made.
+  /// Empty: they have this meaning, or a person accepted the model for this configuration.
   std::string unfit{};
   std::string measured_otherwise{};  ///< changed_measurements()
   std::string recording_gap;         ///< ModelDocument::recording_gap
@@ -66,7 +66,7 @@ class ModelKeeper {
   /// renames a damaged state file. Ignores errors; read_active() returns them.
   void tidy_store();
 
-  /// As ModelStore::set_lock_timeout().
+  /// Sets a shorter time-out for the lock, see ModelStore::set_lock_timeout().
   void set_lock_timeout(std::chrono::nanoseconds patience) noexcept {
     store_.set_lock_timeout(patience);
   }
@@ -86,8 +86,8 @@ class ModelKeeper {
   /// An error only if the store itself cannot be read; a damaged model is reported in
   /// ActiveModel::fault.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
-  /// As read_active(); if that fails, renames a damaged state file and reads again. Waits for the
-  /// store's lock at most kRenameTimeout.
+  /// Same as read_active(). If that fails, renames a damaged state file and reads again. Waits for
+  /// the store's lock at most kRenameTimeout.
   [[nodiscard]] Result<ActiveModel> read_active_or_set_aside(protocol::HostTime now);
   static constexpr std::chrono::seconds kRenameTimeout{1};
   /// While the stamp is unchanged, read_active() gives the same result. One system call.

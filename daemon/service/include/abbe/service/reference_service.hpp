@@ -23,7 +23,7 @@ class ReferenceService : public PipelineObserver {
   struct AxisStatus {
     std::string name;
     AxisReference found;           ///< result of the running or latest session
-    double reading_at_zero = 0.0;  ///< in state Found: reading at count 0, m or rad
+    double reading_at_zero = 0.0;  ///< reading at count 0 in state Found, m or rad
     bool known = false;            ///< the axis is referenced now
   };
 

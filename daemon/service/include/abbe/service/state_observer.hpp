@@ -24,7 +24,7 @@ namespace abbe::daemon {
 struct ObservedParticipant {
   std::uint64_t restarts = 0;
   std::string last_end;     ///< "signal 9 (Killed) at 2026-11-22T16:58:22Z"; empty: none
-  std::string start_fault;  ///< why abbe-dds cannot be started; empty: no fault
+  std::string start_fault;  ///< reason why abbe-dds cannot be started; empty: no fault
 };
 
 struct ObservedModel {

@@ -51,7 +51,7 @@ class StoreChanges {
   [[nodiscard]] Result<std::uint64_t> begin(Change change);
 
   std::filesystem::path store_;
-  std::mutex mutex_;  // of the members below
+  std::mutex mutex_;  // guards the members below
   std::uint64_t number_ = 0;
   std::future<Result<std::string>> running_;
   std::optional<Result<std::string>> done_;

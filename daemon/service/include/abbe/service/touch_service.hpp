@@ -49,7 +49,7 @@ class TouchService {
     std::size_t asked = 0;
     /// touches with their position, in the requested order
     std::vector<protocol::ProbeTrigger> touches;
-    std::string reason;  ///< why the job ended before the last touch; empty: it did not
+    std::string reason;  ///< reason why the job ended before the last touch; empty: it did not
     /// Outcome of the stop, if the job was cancelled and has ended.
     drivers::IppStop stop = {};
   };

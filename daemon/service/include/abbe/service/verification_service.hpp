@@ -30,7 +30,8 @@ class VerificationService {
   [[nodiscard]] Result<void> end(std::uint64_t number);
   /// The points so far. Refused after another verification was begun.
   [[nodiscard]] Result<const StandstillPoints*> points(std::uint64_t number) const;
-  /// Why no more points are taken although end() was not called; empty: points are still taken.
+  /// The reason why no more points are taken although end() was not called; empty: points are still
+  /// taken.
   [[nodiscard]] std::string stopped() const;
   /// The name of the machine in the configuration.
   [[nodiscard]] const std::string& machine() const noexcept { return config_.machine.name; }

@@ -65,8 +65,9 @@ class FragmentReassembly;
 
 /// The messages that DDS Security signs.
 enum class Protection {
-  None,     ///< DDS Security is off
-  Profile,  ///< as the governance of a site's profile states, which the filter does not know
+  None,  ///< DDS Security is off
+  /// messages as the governance of a site's profile states; the filter does not know which
+  Profile,
   Messages  ///< every message: the governance that `abbe dds keys` makes (rtps_protection_kind)
 };
 

@@ -34,7 +34,7 @@ namespace abbe::dds {
 /// [DDSI-RTPS 2.5, 8.2.4.2].
 using ParticipantId = std::array<std::uint8_t, 12>;
 
-/// In the format of Fast DDS and Cyclone DDS, for example "010f4e2a.8c1f0100.00000000".
+/// The id in the format of Fast DDS and Cyclone DDS, for example "010f4e2a.8c1f0100.00000000".
 [[nodiscard]] inline std::string text_of(const ParticipantId& id) {
   std::string text;
   for (std::size_t i = 0; i < id.size(); ++i) {

@@ -43,7 +43,7 @@ class SequenceWindow {
   /// writer, for example because it is a best-effort writer.
   [[nodiscard]] std::optional<std::uint64_t> next_of(const WriterGuid& writer) const;
 
-  /// How many of `wanted` numbers a heartbeat may skip now.
+  /// The number of `wanted` numbers that a heartbeat may skip now.
   [[nodiscard]] std::uint64_t take_skip(std::uint64_t wanted) const;
 
  private:

@@ -55,7 +55,7 @@ struct BlockFace {
 struct CalibratorFile {
   InputFile source;
   calib::evemu::Calibrator calibrator;
-  std::array<std::optional<BlockFace>, 2> faces;  ///< of blocks 1 and 2
+  std::array<std::optional<BlockFace>, 2> faces;  ///< the faces of blocks 1 and 2
 };
 [[nodiscard]] Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file);
 /// Same as read_calibrator_toml() for the content of a file; `file` is its name in messages.

@@ -50,7 +50,7 @@ struct ArrayFiles {
 /// Table [[bar]]: touches of a Multi-Feature Bar.
 struct BarFiles {
   std::string name;               ///< default: "bar 1", ...
-  std::string bar, plan, points;  ///< as for `abbe identify mfb`
+  std::string bar, plan, points;  ///< files as for `abbe identify mfb`
 };
 
 struct PartsFile {

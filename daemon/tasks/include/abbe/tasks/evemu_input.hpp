@@ -21,11 +21,11 @@ namespace abbe::daemon {
 /// The options that name the data. An empty name means that the file is not given.
 struct EvemuInputArguments {
   std::string machine, touches, calibrator, errors, recording, rotation_reference;
-  std::optional<int> order, positions;             ///< without a value: as in [evemu]
+  std::optional<int> order, positions;             ///< default: the value of [evemu]
   std::optional<double> artefact_C, u_artefact_K;  ///< both or none
   std::optional<double> u_reference_um{};          ///< required with rotation_reference
   bool rotation_known = false, scales_corrected = false;
-  std::optional<calib::Vector3> tip_offset_m{};  ///< without a value: [target] offset_mm
+  std::optional<calib::Vector3> tip_offset_m{};  ///< default: [target] offset_mm
 };
 
 /// The measured data, from files or from a recording.

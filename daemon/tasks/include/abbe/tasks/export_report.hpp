@@ -12,7 +12,7 @@ namespace abbe::daemon {
 
 struct ExportReport {
   const FormatFacts* facts = nullptr;
-  WriteOptions written;  ///< with the origin
+  WriteOptions written;  ///< options of the writer, with the origin
   HeldCorrection held;
   std::vector<std::string> files;
   ExportProof proof;

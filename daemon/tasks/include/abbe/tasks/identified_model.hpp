@@ -27,7 +27,7 @@ struct ActiveDocument {
 /// The model with which the gate compares a candidate.
 struct ComparisonModel {
   const calib::VolumetricModel* model = nullptr;  ///< null: no comparison
-  /// why the active model is not compared; empty: it is compared, or there is none
+  /// reason why the active model is not compared; empty: it is compared, or there is none
   std::string left_out;
 
   void add_note(calib::Verdict& verdict) const;  ///< adds `left_out` to the notes of `verdict`

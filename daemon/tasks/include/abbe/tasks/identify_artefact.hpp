@@ -20,7 +20,7 @@ struct IdentifyArtefactArguments {
   double tip_radius_mm = 0.0;  ///< tip radius of these touches
   /// Tip radius on the machine to be calibrated; negative: the same as `tip_radius_mm`.
   double machine_tip_radius_mm = -1.0;
-  std::optional<double> u_touch_um;  ///< without a value: estimated from the touches
+  std::optional<double> u_touch_um;  ///< default: estimated from the touches
 };
 
 struct IdentifiedArtefact {

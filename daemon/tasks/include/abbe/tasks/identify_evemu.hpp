@@ -17,7 +17,7 @@ namespace abbe::daemon {
 struct IdentifyEvemuArguments {
   EvemuInputArguments input;
   std::string keep;  ///< store with whose active model the gate compares; or empty
-  std::optional<std::string> estimator, folds;  ///< without a value: as in [evemu]
+  std::optional<std::string> estimator, folds;  ///< default: the value of [evemu]
   bool accept_shape_only = false;
 };
 

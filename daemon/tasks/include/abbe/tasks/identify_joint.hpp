@@ -28,7 +28,7 @@ struct JointOutcome {
 /// The result if parts contradict each other: there is no joint model.
 struct JointContradiction {
   JointInput input;
-  calib::joint::JointIdentification identified;  ///< with the tests and the contradictions
+  calib::joint::JointIdentification identified;  ///< result with the tests and the contradictions
 };
 
 /// Errors are those of read_joint_input(). A JointContradiction is not an error, because its tests

@@ -20,16 +20,16 @@ namespace abbe::daemon {
 /// Arguments as given by the user: file names and values.
 struct IdentifyOtfArguments {
   std::string machine, path, tracker, encoder, recording, keep, mode, tables;
-  std::optional<std::string> estimator;  // without a value: as in [otf]
+  std::optional<std::string> estimator;  // default: the value of [otf]
   std::size_t segment_samples = 0;       // 0: segments are formed by travel
-  std::optional<double> u_scale_ppm;     // without a value: as in the configured tracker
+  std::optional<double> u_scale_ppm;     // default: the value of the configured tracker
   std::string backlash;                  // empty: as in [otf]
   std::string smoothness;                // empty: as in [otf]
   double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
   std::vector<std::string> targets;          // X,Y,Z=FILE, one per run
   std::vector<std::string> tracker_centres;  // elements of --tracker-centre-mm, "X,Y,Z"
-  // without a value: as in the configuration
+  // default: the values of the configuration
   std::optional<calib::Vector3> target_offset_m{}, tracker_position_m{};
   /// Position of the tracker in the frame of the points x_mm, y_mm, z_mm. One element for all
   /// files, or one per target.

@@ -19,7 +19,7 @@ namespace abbe::daemon {
 struct IdentifyJointArguments {
   std::string machine, parts, keep;
   std::optional<std::string> estimator;  // estimator for the runs; without a value: as in [otf]
-  std::optional<double> u_scale_ppm;     // without a value: as in the configured tracker
+  std::optional<double> u_scale_ppm;     // default: the value of the configured tracker
   double false_alarm = calib::joint::JointOptions{}.false_alarm;
   bool scales_corrected = false, accept_path_orientation = false;
 };

@@ -39,7 +39,7 @@ struct PathPlan {
   /// position of a tracker, and the rms of the predicted standard uncertainty
   std::vector<std::pair<calib::Vector3, double>> trackers;
   std::size_t corners_not_reached = 0;
-  bool ended_early = false;  ///< by Progress::stopped()
+  bool ended_early = false;  ///< true: Progress::stopped() ended the search
 };
 
 /// If `arguments.path` is given: a prediction for this path. Else a new path: the best path found

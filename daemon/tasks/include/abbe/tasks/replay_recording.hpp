@@ -18,7 +18,7 @@ struct ReplayArguments {
   std::string file;
   /// configuration file used instead of the recorded configuration; empty: the recorded one
   std::string config;
-  bool raw = false;    ///< from the raw bytes of the devices instead of the decoded samples
+  bool raw = false;    ///< true: replay the raw bytes of the devices instead of the decoded samples
   double speed = 0.0;  ///< recorded time per real time; 0: as fast as possible
   /// ReplayOptions::samples; if set, only the samples are wanted, not the models
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples = {};

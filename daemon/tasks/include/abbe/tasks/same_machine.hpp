@@ -29,7 +29,7 @@ struct OfMachine {
 
 /// A model that is compared with measurements or with other models.
 struct ComparedModel {
-  std::string name;  ///< as given by the user
+  std::string name;  ///< name as given by the user
   ModelDocument document;
   std::vector<std::string> cautions;  ///< cautions_of()
   std::string machine;                ///< of_machine()

@@ -26,7 +26,7 @@ struct ModelAtPoints {
 /// The result for one model, which is also compared on a grid, or for several models at the same
 /// places. Only places inside the validity volume of every model are compared.
 struct Verification {
-  std::vector<ModelAtPoints> models;         ///< in the order of the arguments; at least one
+  std::vector<ModelAtPoints> models;         ///< models in the order of the arguments; at least one
   calib::verify::Observations observations;  ///< observations at all places
   std::size_t inside = 0;                    ///< number of places that are compared
   std::vector<InputFile> inputs;
@@ -37,14 +37,14 @@ struct Verification {
   /// Usual mistakes in the points that would explain the differences: with the mistake corrected,
   /// the points fit the model far better. One line each; empty for several models.
   std::vector<std::string> likely_mistakes;
-  /// why points are missing or may be wrong; empty: all points are complete
+  /// reason why points are missing or may be wrong; empty: all points are complete
   std::string cut_short;
   /// result of different_machines(); for one model it is also one of its cautions
   std::string different_machines;
   /// Positions of the planes in which the vectors are drawn, one coordinate per axis; default: the
   /// middle of the grid.
   std::optional<calib::Vector3> planes_m;
-  CertificateDetails details{};  ///< of certificate.toml; empty: not given
+  CertificateDetails details{};  ///< contents of certificate.toml; empty: not given
 
   /// The comparison of the first model.
   [[nodiscard]] const calib::verify::Comparison& comparison() const {

@@ -16,8 +16,8 @@ namespace abbe::daemon {
 
 struct LivePoints {
   VerificationFile file;  ///< for points measured by the daemon, `source` has no name
-  /// Why points are missing: the daemon does not answer any more (Io), or the recording is damaged
-  /// before its end (DataInsufficient).
+  /// The reason why points are missing: the daemon does not answer any more (Io), or the recording
+  /// is damaged before its end (DataInsufficient).
   std::optional<Error> cut_short;
   std::string machine{};  ///< machine on which the points were measured; empty: not known
 };

@@ -87,7 +87,7 @@ class EncoderDevice final : public Device {
   /// Each ring has one reader.
   [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
-  /// Only for the device thread.
+  /// The receiver. To be used by the device thread only.
   [[nodiscard]] const EncoderReceiver& receiver() const noexcept { return receiver_; }
 
  private:

@@ -71,7 +71,7 @@ struct EncoderAxis {
   AxisKind kind = AxisKind::Linear;
   can::PositionType position = can::PositionType::Signed32;
   std::uint8_t tpdo = 1;           ///< 1 or 2
-  std::uint8_t position_byte = 0;  ///< where in the TPDO the position begins
+  std::uint8_t position_byte = 0;  ///< byte in the TPDO at which the position begins
   std::optional<double> scale{};   ///< m or rad per count, negative reverses; none: read by SDO
   double offset = 0.0;             ///< m or rad: the reading at count 0
   /// Number of counts after which the position wraps to 0. 0: the range that the encoder reports;
@@ -88,7 +88,7 @@ struct EncoderAxis {
 struct EncoderReceiverOptions {
   std::vector<EncoderAxis> axes;  ///< 1 to protocol::kMaxAxes, in the order of the sample
   std::chrono::nanoseconds sync_period = std::chrono::milliseconds{1};
-  std::chrono::nanoseconds answer_within{};  ///< after the SYNC; 0: 0.8 of the period
+  std::chrono::nanoseconds answer_within{};  ///< time after the SYNC; 0: 0.8 of the period
   /// Delay from the time of the SYNC to the sampling of the position in the encoder. It depends on
   /// the device and must be calibrated.
   std::chrono::nanoseconds sampling_delay{};
@@ -189,8 +189,8 @@ class EncoderReceiver {
     std::uint8_t position_byte = 0;
     std::uint32_t bits_before = 0;  ///< offset of the mapping entry that is read next
     std::uint32_t units = 0;        ///< rotary: counts per revolution, as read
-    bool single_turn = false;       ///< as the device type says
-    std::optional<double> middle;   ///< of the travel of a rotary axis
+    bool single_turn = false;       ///< value from the device type
+    std::optional<double> middle;   ///< middle of the travel of a rotary axis
     std::chrono::nanoseconds heartbeat_timeout{};
     bool scale_configured = false;
     bool wrap_configured = false;
@@ -249,7 +249,7 @@ class EncoderReceiver {
   bool external_sync_;
 
   bool open_ = false;                            ///< the cycle has not ended
-  std::optional<protocol::HostTime> sync_time_;  ///< of the latest SYNC
+  std::optional<protocol::HostTime> sync_time_;  ///< time of the latest SYNC
   std::uint32_t cycle_ = 0;
   std::uint8_t received_mask_ = 0;  ///< answered in the latest cycle, also too late
   /// Axes that have answered in the latest cycle, but too late or with an answer that may belong to
@@ -263,7 +263,7 @@ class EncoderReceiver {
   bool bus_error_pending_ = false;  ///< an error frame arrived since the previous sample
   bool restarted_pending_ = false;
   bool gap_pending_ = false;
-  bool time_widened_ = false;       ///< of the SYNC or of an answer of the open cycle
+  bool time_widened_ = false;       ///< for the SYNC or for an answer of the open cycle
   std::uint32_t lost_pending_ = 0;  ///< SYNCs not sent; the next sample reports them as lost
   protocol::AxisSample current_;    ///< counts and positions are kept between cycles
   std::array<protocol::AxisSample, 4> out_{};

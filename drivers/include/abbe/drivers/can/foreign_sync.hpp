@@ -58,7 +58,7 @@ class ForeignSync {
   protocol::HostTime heard_until_{};
   std::uint64_t count_ = 0;  ///< foreign SYNCs since the first one
   protocol::HostTime first_{}, last_{};
-  std::uint64_t intervals_ = 0;  ///< since first_
+  std::uint64_t intervals_ = 0;  ///< number of intervals since first_
   std::chrono::nanoseconds longest_{};
   std::chrono::nanoseconds slowest_{};  ///< the longest interval since construction
   std::optional<std::chrono::nanoseconds> period_;

@@ -39,7 +39,8 @@ class PendingSync {
   /// True if no further SYNC may be sent yet: the latest SYNC may still be queued, or it was
   /// transmitted late and its answers are arriving. A missing echo blocks for at most kPatience.
   [[nodiscard]] bool waits(protocol::HostTime now) const;
-  /// When settle() must be called even without new frames; HostTime::max(): not needed.
+  /// The time at which settle() must be called even without new frames; HostTime::max(): not
+  /// needed.
   [[nodiscard]] protocol::HostTime deadline() const { return deadlines_.at(Due::Echo); }
 
   /// Converts the frames that read() delivered until `now` to the frames for the receiver: every
@@ -66,7 +67,8 @@ class PendingSync {
 
   std::chrono::nanoseconds period_;
   std::chrono::nanoseconds answer_within_;
-  std::optional<protocol::HostTime> sent_;  ///< until its echo
+  /// sending time of the SYNC; set until its echo arrives
+  std::optional<protocol::HostTime> sent_;
   Deadlines<Due::Answers> deadlines_;
   std::bitset<std::size_t{can::kMaxNodeId} + 1> answered_;  ///< nodes, for the previous SYNC
 };

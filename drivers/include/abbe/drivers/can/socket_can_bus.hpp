@@ -23,7 +23,7 @@ struct SocketCanOptions {
   /// true: an interface without CAN FD is refused. On an interface with CAN FD, FD frames are read
   /// with either value.
   bool require_fd = false;
-  double speed = 1.0;  ///< as UdpCanOptions::speed
+  double speed = 1.0;  ///< same as UdpCanOptions::speed
 };
 
 class SocketCanBus final : public CanBus {
@@ -64,7 +64,7 @@ class SocketCanBus final : public CanBus {
   std::unique_ptr<Batch> batch_;
   std::optional<ReceivedFrame> held_;  ///< frame for which `out` had no space beside a loss mark
   std::uint64_t lost_ = 0;
-  std::uint32_t last_overflow_ = 0;  ///< of SO_RXQ_OVFL, which counts per socket
+  std::uint32_t last_overflow_ = 0;  ///< value of SO_RXQ_OVFL, which counts per socket
 };
 
 }  // namespace abbe::drivers

@@ -64,10 +64,10 @@ class CounterCardDevice final : public Device {
   /// Each ring has one reader. A card that latches all its axes on their index delivers no samples.
   [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
-  /// While the clock model is settled, one entry a second, written after the sample of the same
-  /// scan. One reader.
+  /// The progress of the counters: one entry a second while the clock model is settled, written
+  /// after the sample of the same scan. One reader.
   [[nodiscard]] SampleRing<CounterCardProgress>& progress() noexcept { return progress_ring_; }
-  /// Only for the device thread.
+  /// The receiver. To be used by the device thread only.
   [[nodiscard]] const CounterCardReceiver& receiver() const noexcept { return receiver_; }
   /// A sentence that names the assumption about latched counters (wiring.hpp), if the configuration
   /// relies on it without `latch_verified`; else empty.
@@ -110,7 +110,8 @@ class CounterCardDevice final : public Device {
   CounterCardReceiver receiver_;
   CounterCardSession session_;
 
-  std::span<const UsbEvent> events_;  ///< of the latest wait(), for the session in the next wait()
+  /// events of the latest wait(), for the session in the next wait()
+  std::span<const UsbEvent> events_;
   protocol::HostTime cycle_end_{};
   protocol::HostTime read_until_{};  ///< the latest wait() read all earlier events
   std::size_t scans_ = 0;            ///< number of scans in the latest receive()

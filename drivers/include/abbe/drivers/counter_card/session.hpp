@@ -29,8 +29,8 @@ struct CounterCardSessionOptions {
   UsbBulkStream stream;
   std::chrono::nanoseconds open_timeout = std::chrono::seconds{2};
   std::chrono::nanoseconds control_timeout = std::chrono::milliseconds{500};
-  /// Without scans for this long the session reports a fault. 90 ms: within 100 ms of the last
-  /// scan.
+  /// Longest time without scans; after it the session reports a fault. With 90 ms the fault is
+  /// reported within 100 ms of the last scan.
   std::chrono::nanoseconds silence = std::chrono::milliseconds{90};
   std::chrono::nanoseconds status_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
@@ -120,7 +120,7 @@ class CounterCardSession {
   using Now = protocol::HostTime;
   /// Inputs with a deadline: it is a fault if the input has not arrived by then.
   enum class Input : std::uint8_t { Opened, ControlDone, BulkStopped, Scans };
-  /// What the session does when a deadline of planned_ has passed.
+  /// Actions of the session when a deadline of planned_ has passed.
   enum class Plan : std::uint8_t {
     Open,
     Step,    ///< the next request of the stage, or the halt of the scan

@@ -51,10 +51,10 @@ struct CounterCardWiring {
   std::vector<CounterAxis> axes;
   std::uint8_t clock_channel = 5;
   ClockSource clock_source = ClockSource::External;
-  double clock_hz = 10e6;  ///< with a timer: 48 MHz divided by an integer
+  double clock_hz = 10e6;  ///< clock frequency; for a timer, 48 MHz divided by an integer
   std::optional<std::uint8_t> latch_channel;
   std::optional<std::uint8_t> edge_channel;
-  quad08::Debounce latch_debounce{};  ///< of the index input of the latch channel
+  quad08::Debounce latch_debounce{};  ///< debounce of the index input of the latch channel
   quad08::Debounce edge_debounce{};
   /// the ASSUMPTION at the top of this file was verified on this card
   bool latch_verified = false;

@@ -33,7 +33,7 @@ struct EnvironmentDeviceOptions {
   std::chrono::nanoseconds period = std::chrono::seconds{1};  ///< between starts of rounds
   std::chrono::nanoseconds answer_timeout = std::chrono::milliseconds{500};
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{1};  ///< wall time
-  std::chrono::nanoseconds retry = std::chrono::milliseconds{250};     ///< after a fault
+  std::chrono::nanoseconds retry = std::chrono::milliseconds{250};     ///< pause after a fault
   std::chrono::nanoseconds refused_retry = std::chrono::seconds{10};
   std::size_t sample_capacity = 64;
   std::size_t raw_capacity_blocks = 256;
@@ -45,8 +45,8 @@ class EnvironmentDevice final : public Device {
   /// host or path, or for a period not above 0. The first wait() opens the line.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentDevice>> create(
       const EnvironmentDeviceOptions& options, const TimeSource& time);
-  /// As the create() above, but over a connection shared with other devices; `link` must outlive
-  /// the device.
+  /// Same as the create() above, but over a connection shared with other devices; `link` must
+  /// outlive the device.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentDevice>> create(
       const EnvironmentDeviceOptions& options, const TimeSource& time, EnvironmentLink& link);
 
@@ -108,7 +108,8 @@ class EnvironmentDevice final : public Device {
   protocol::HostTime answer_due_{};
   protocol::HostTime arrival_{};
   std::uint64_t implausible_seen_ = 0;
-  Progress progress_ = Progress::Waiting;  ///< from receive() to the next wait(), same thread
+  /// passed from receive() to the next wait(), same thread
+  Progress progress_ = Progress::Waiting;
   std::size_t filled_ = 0;
   std::array<std::byte, modbus::kMaxAduSize> buffer_{};
 };

@@ -26,7 +26,7 @@ class EnvironmentLine final : public Device {
   /// Status of the first device. For the others use device(i).status().
   [[nodiscard]] DeviceStatus status() const override { return devices_.front()->status(); }
 
-  /// In the order of the options.
+  /// The devices in the order of the options.
   [[nodiscard]] EnvironmentDevice& device(std::size_t i) noexcept { return *devices_[i]; }
 
  private:

@@ -67,7 +67,7 @@ class ModbusLine {
   struct Free {
     void operator()(_modbus* context) const noexcept;
   };
-  std::optional<HostAddresses> host_;  ///< of ModbusTcp
+  std::optional<HostAddresses> host_;  ///< addresses of a ModbusTcp host
   SerialLock lock_;                    ///< declared first: released after the line is closed
   std::unique_ptr<_modbus, Free> context_;
 };

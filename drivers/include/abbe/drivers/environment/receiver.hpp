@@ -30,7 +30,7 @@ struct EnvironmentFailure {
   enum class Kind : std::uint8_t {
     None,
     Unasked,      ///< bytes without an outstanding request
-    Malformed,    ///< not a valid answer to the request: `error`
+    Malformed,    ///< the answer is not valid for the request: `error`
     Exception,    ///< the device answered with the Modbus exception code `exception`
     Unproven,     ///< proving register `index` contains `value`: wrong device or wrong map
     Implausible,  ///< measured register `index` reads `value` in the first round: wrong map

@@ -21,7 +21,7 @@ namespace modbus = protocol::modbus;
 struct RegisterPlace {
   std::uint8_t unit = 1;
   modbus::Function function = modbus::Function::ReadHoldingRegisters;
-  std::uint16_t address = 0;  ///< as on the wire, from 0, before `base_offset` of the map
+  std::uint16_t address = 0;  ///< address on the wire, from 0, before `base_offset` of the map
   modbus::RegisterType type = modbus::RegisterType::Int16;
   modbus::WordOrder order = modbus::WordOrder::HighFirst;
 };

@@ -29,7 +29,7 @@ namespace abbe::drivers {
 
 /// State of the machine that must be kept over a restart of the daemon.
 struct IppMachine {
-  std::string held;     ///< why the machine awaits a release; empty if it does not
+  std::string held;     ///< reason why the machine awaits a release; empty if it does not
   bool moving = false;  ///< the machine is moving, or was when the connection was lost
   friend bool operator==(const IppMachine&, const IppMachine&) = default;
 };
@@ -101,9 +101,9 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// are not begun when the connection is lost, and points requested before the session is ready,
   /// are discarded; each case is a fault.
   void measure(const ProbePoint& point) { measure(std::span{&point, 1}); }
-  /// As measure() of one point, for a path. If the connection is lost, all remaining points are
-  /// discarded: driving only a part of the path could lead to a collision. A path with a point that
-  /// I++ DME cannot express is discarded as a whole: see check().
+  /// Same as measure() of one point, but for a path. If the connection is lost, all remaining
+  /// points are discarded: driving only a part of the path could lead to a collision. A path with a
+  /// point that I++ DME cannot express is discarded as a whole: see check().
   void measure(std::span<const ProbePoint> points);
   /// Any thread; takes no lock. Stops a motion in progress (AbortE) and discards all points. The
   /// session then awaits release(), whether or not the machine was moving. Returns the number of

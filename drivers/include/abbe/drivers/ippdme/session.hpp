@@ -96,17 +96,18 @@ enum class IppStopOutcome : std::uint8_t {
 [[nodiscard]] const char* name_of(IppStopOutcome) noexcept;
 
 struct IppStop {
-  std::uint64_t number = 0;  ///< of the latest request that the session has received
+  std::uint64_t number = 0;  ///< number of the latest request that the session has received
   IppStopOutcome outcome = IppStopOutcome::None;
   std::string text;  ///< the reason of the outcome, a sentence
 };
 
 struct IppSessionOptions {
   std::string peer = "measuring machine";  ///< name in messages: "cmm 10.0.0.9:1294"
-  bool home = false;    ///< true: Home is sent if the machine is not homed; false: that is a fault
-  std::string held;     ///< reason to await a release from the start; empty: none is awaited
-  bool moving = false;  ///< with held: the machine may be moving; its motion is aborted first
-  std::string tool;     ///< tool to set before measuring; empty: keep the current tool
+  bool home = false;  ///< true: Home is sent if the machine is not homed; false: that is a fault
+  std::string held;   ///< reason to await a release from the start; empty: none is awaited
+  /// used with `held`: the machine may be moving; its motion is aborted first
+  bool moving = false;
+  std::string tool;  ///< tool to set before measuring; empty: keep the current tool
   /// Request positions during motions. A refusal of this request with severity 1 is no fault.
   bool move_reports = true;
   std::chrono::nanoseconds poll_period = std::chrono::milliseconds{100};
@@ -151,7 +152,7 @@ struct IppNothing {};
 struct IppOpen {};
 struct IppClose {};  ///< action: close the connection; no IppConnectionLost follows
 struct IppSend {
-  std::string line;  ///< with its CR LF
+  std::string line;  ///< command line with its CR LF
 };
 using IppAction = std::variant<IppNothing, IppOpen, IppClose, IppSend>;
 
@@ -186,8 +187,8 @@ class IppSession {
   void give_up_stop();
   /// The latest request to stop and its outcome.
   [[nodiscard]] const IppStop& stop() const noexcept { return stop_; }
-  /// Why the machine may be moving although the session cannot stop it now; empty if it cannot be
-  /// moving.
+  /// The reason why the machine may be moving although the session cannot stop it now; empty if it
+  /// cannot be moving.
   [[nodiscard]] std::string danger() const;
   /// Number of requested points that are neither finished nor discarded.
   [[nodiscard]] std::size_t points_left() const noexcept {
@@ -289,7 +290,7 @@ class IppSession {
   std::chrono::nanoseconds pause_;
   std::uint32_t tag_ = 0;
   std::optional<Pending> pending_;
-  Step prepared_{};  ///< in Storing: the motion that is sent next
+  Step prepared_{};  ///< motion that is sent next, in state Storing
   std::deque<ProbePoint> points_;
   bool stopped_ = false;
   bool open_ = false;        ///< the connection is established

@@ -56,7 +56,7 @@ inline constexpr std::size_t kMarksForZero = 4;
 
 struct MarkZero {
   std::int64_t first_mark = 0;  ///< position of the first of the four, periods
-  int direction = 1;            ///< of crossing
+  int direction = 1;            ///< direction of crossing, +1 or -1
   double offset_periods = 0.0;  ///< scale position = counter + offset, mean of the four
   double spread_periods = 0.0;  ///< largest minus smallest of the four offsets
 };

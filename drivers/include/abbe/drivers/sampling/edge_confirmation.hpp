@@ -38,9 +38,10 @@ class EdgeConfirmation {
 
   explicit EdgeConfirmation(const EdgeRules& rules) noexcept : rules_(rules) {}
 
-  /// To be called for a scan without an edge.
+  /// Call it for a scan without an edge.
   [[nodiscard]] Event on_time(std::int64_t now) ABBE_RT;
-  /// To be called for a scan with rising edges, the last at `edge`; `several`: more than one edge.
+  /// Call it for a scan with rising edges, the last at `edge`. `several`: there was more than one
+  /// edge.
   [[nodiscard]] Event on_edge(const EdgeInterval& edge, bool several) ABBE_RT;
   /// For debounced counters: to be called for a scan in which the edge counter has counted. `edge`:
   /// interval of the edge, used if no latch has shown this edge before.

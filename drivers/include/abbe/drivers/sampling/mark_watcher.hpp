@@ -20,7 +20,7 @@ struct MarkCrossing {
   protocol::SampleHead head;
   protocol::HostTime not_before{};  ///< time of the scan before `head`
   std::uint8_t axis = 0;            ///< index in the sample
-  std::int64_t count = 0;           ///< of the latching card at the mark
+  std::int64_t count = 0;           ///< count of the latching card at the mark
 };
 
 class MarkWatcher final : public CounterScanSink {

@@ -49,7 +49,7 @@ struct ProbeSwitching {
 
 /// The probe's channels on the counter card.
 struct ProbeWiring {
-  double clock_hz = 10e6;  ///< of the counted time base
+  double clock_hz = 10e6;  ///< frequency of the counted time base
   /// Debounce time of the edge counter: it counts an edge after the signal was stable for this
   /// time, which then replaces `confirm`. 0: it counts every edge.
   std::chrono::nanoseconds counter_debounce{};

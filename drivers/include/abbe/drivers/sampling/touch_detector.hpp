@@ -70,7 +70,7 @@ class TouchDetector final : public CounterScanSink {
 
   bool refused_latest_ = false;     ///< the latched count of this scan's edge is implausible
   bool refused_first_ = false;      ///< the same for the first edge of the pending touch
-  bool restarted_pending_ = false;  ///< to be reported with the next touch
+  bool restarted_pending_ = false;  ///< a restart must be reported with the next touch
   std::uint32_t number_ = 0;
   protocol::ProbeTrigger touch_;  ///< the latest touch
   bool window_open_ = false;

@@ -31,9 +31,10 @@ class BurstTimes {
   /// Sets time, u_time and the flags of time of points that arrived at `arrival` and have their
   /// device_time; other flags remain. At most kMostPoints.
   void assign(std::span<protocol::TrackerPoint> points, protocol::HostTime arrival) ABBE_RT;
-  /// As assign(), for a point without a device time. The point is the mean over [arrival - delay -
-  /// duration, arrival - delay], where 0 <= delay <= max_constant_delay. Its time is the middle of
-  /// this interval; delay and duration each contribute a rectangular distribution ([GUM] 4.3.7).
+  /// Same as assign(), for a point without a device time. The point is the mean over [arrival -
+  /// delay - duration, arrival - delay], where 0 <= delay <= max_constant_delay. Its time is the
+  /// middle of this interval; delay and duration each contribute a rectangular distribution ([GUM]
+  /// 4.3.7).
   void assign_mean(protocol::TrackerPoint& point, std::chrono::nanoseconds duration,
                    protocol::HostTime arrival) ABBE_RT;
 

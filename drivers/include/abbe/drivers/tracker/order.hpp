@@ -10,7 +10,8 @@
 
 namespace abbe::drivers {
 
-/// In bytes: an emScon name has at most 32 UTF-16 code units, each at most 3 bytes in UTF-8.
+/// Longest name in bytes: an emScon name has at most 32 UTF-16 code units, each at most 3 bytes in
+/// UTF-8.
 inline constexpr std::size_t kLongestReflectorName = 96;
 /// Largest search distance, above the range of every tracker. A larger one is refused: its unit is
 /// probably wrong.

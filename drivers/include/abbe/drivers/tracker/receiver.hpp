@@ -59,7 +59,7 @@ struct TrackerProtocolError {
   std::size_t length = 0;
 };
 
-/// What next() returns. The messages are in the order of their bytes.
+/// The results of next(). The messages are in the order of their bytes.
 using TrackerMessage =
     std::variant<TrackerBurst, protocol::EnvironmentSample, emscon::Answer, emscon::ErrorResponse,
                  emscon::StatusChange, TrackerProtocolError>;

@@ -161,7 +161,7 @@ class TrackerSession {
     std::string text;
   };
   [[nodiscard]] const Fault& fault() const noexcept { return fault_; }
-  /// Why no points arrive, and the remedy; empty while points arrive.
+  /// The reason why no points arrive, and the remedy; empty while points arrive.
   [[nodiscard]] const std::string& cause() const noexcept { return cause_; }
   /// The report of the latest order; nullopt if there is none, or if it was already taken.
   [[nodiscard]] std::optional<TrackerOrderReport> take_report() {
@@ -178,7 +178,7 @@ class TrackerSession {
     bool optional = false;  ///< a refusal counts as done
     bool of_order = false;  ///< a refusal ends the order, not the session
   };
-  /// What follows when the last step of a plan (a list of commands to send) is done.
+  /// The action after the last step of a plan (a list of commands to send).
   enum class Goal { SetUp, Stream, Stay, Leave, GiveUp };
   struct Pending {
     Step step;
@@ -279,7 +279,7 @@ class TrackerSession {
   TrackerSettings settings_;
   std::vector<Step> plan_;
   Goal goal_ = Goal::Stream;
-  bool initialised_ = false;  ///< as the controller reported on this connection
+  bool initialised_ = false;  ///< state that the controller reported on this connection
   TrackerState state_ = TrackerState::Disconnected;
   protocol::HostTime now_{};
   std::size_t step_ = 0;

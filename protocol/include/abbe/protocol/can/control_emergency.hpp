@@ -13,7 +13,7 @@ namespace abbe::protocol::can {
 
 enum class ControlCause : std::uint8_t {
   NotHomed = 1,
-  NoPosition = 2,  ///< not finite, or beyond 32 bits
+  NoPosition = 2,  ///< the position is not finite, or exceeds 32 bits
 };
 [[nodiscard]] const char* to_text(ControlCause cause) noexcept;  ///< static storage
 

@@ -14,7 +14,7 @@ namespace abbe::protocol::can {
 enum class BusCondition : std::uint32_t {
   TransmitTimeout = 1u << 0,
   LostArbitration = 1u << 1,
-  ReceiveOverflow = 1u << 2,  ///< of the controller: frames are lost
+  ReceiveOverflow = 1u << 2,  ///< overflow in the controller: frames are lost
   TransmitOverflow = 1u << 3,
   Warning = 1u << 4,  ///< an error counter reached 96
   Passive = 1u << 5,  ///< an error counter reached 128

@@ -272,7 +272,7 @@ struct TrackerClockReading {
   }
 };
 
-/// Why bytes are not a valid packet.
+/// The reason why bytes are not a valid packet.
 enum class DecodeError {
   Truncated = 1,   ///< fewer bytes than the header, the size field or the packet's layout requires
   SizeMismatch,    ///< the size field is not the number of bytes, or not the size of this packet

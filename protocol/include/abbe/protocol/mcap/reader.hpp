@@ -15,7 +15,7 @@ namespace abbe::protocol::mcap {
 /// One record: its offset in the bytes given to the reader, and its content.
 struct Record {
   Opcode opcode = Opcode::Header;  ///< may be an unknown opcode: skip the record
-  std::size_t offset = 0;          ///< of the opcode
+  std::size_t offset = 0;          ///< offset of the opcode
   Bytes content;
   [[nodiscard]] std::size_t end() const noexcept {
     return offset + kRecordHeadSize + content.size();
@@ -73,7 +73,7 @@ struct ScannedChunk {
     Malformed,   ///< the content of the record is not a valid Chunk
   };
   State state = State::Whole;
-  std::size_t offset = 0;  ///< of the Chunk's opcode in the file
+  std::size_t offset = 0;  ///< offset of the Chunk's opcode in the file
   Chunk chunk;
 };
 

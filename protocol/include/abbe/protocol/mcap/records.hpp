@@ -170,7 +170,7 @@ struct ChunkIndex {
   std::uint64_t first_time_ns = 0;
   std::uint64_t last_time_ns = 0;
   std::uint64_t chunk_start = 0;   ///< offset of the Chunk's opcode in the file
-  std::uint64_t chunk_length = 0;  ///< of the whole Chunk record
+  std::uint64_t chunk_length = 0;  ///< length of the whole Chunk record
   /// Pairs of channel id and offset of the channel's MessageIndex record in the file.
   PackedPairs<std::uint16_t, std::uint64_t> index_offsets;
   std::uint64_t index_length = 0;  ///< total length of the MessageIndex records
@@ -189,7 +189,7 @@ struct Attachment {
 
 struct AttachmentIndex {
   std::uint64_t offset = 0;
-  std::uint64_t length = 0;  ///< of the whole Attachment record
+  std::uint64_t length = 0;  ///< length of the whole Attachment record
   std::uint64_t log_time_ns = 0;
   std::uint64_t create_time_ns = 0;
   std::uint64_t data_size = 0;
@@ -216,7 +216,7 @@ struct Metadata {
 
 struct MetadataIndex {
   std::uint64_t offset = 0;
-  std::uint64_t length = 0;  ///< of the whole Metadata record
+  std::uint64_t length = 0;  ///< length of the whole Metadata record
   std::string_view name;
 };
 

@@ -18,22 +18,23 @@ namespace abbe::protocol::mcap {
 
 struct IndexEntry {
   std::uint64_t log_time_ns = 0;
-  std::uint64_t offset = 0;  ///< of the Message record within the chunk's records
+  std::uint64_t offset = 0;  ///< offset of the Message record within the chunk's records
 };
 
 /// The messages of one channel in a closed chunk.
 struct ChannelShare {
   std::uint16_t channel_id = 0;
   std::uint64_t messages = 0;
-  std::uint64_t index_offset = 0;  ///< of the channel's MessageIndex, from the Chunk's opcode
+  /// offset of the channel's MessageIndex, counted from the Chunk's opcode
+  std::uint64_t index_offset = 0;
 };
 
 /// A chunk with its indexes, to be written in one piece. Views into the builder, valid until its
 /// clear().
 struct ClosedChunk {
   Bytes bytes;                     ///< Chunk, then one MessageIndex per channel
-  std::uint64_t length = 0;        ///< of these bytes
-  std::uint64_t chunk_length = 0;  ///< of the Chunk record alone
+  std::uint64_t length = 0;        ///< number of these bytes
+  std::uint64_t chunk_length = 0;  ///< length of the Chunk record alone
   std::uint64_t records_size = 0;
   std::uint64_t first_time_ns = 0;  ///< 0 without messages
   std::uint64_t last_time_ns = 0;

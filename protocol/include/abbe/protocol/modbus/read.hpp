@@ -20,14 +20,14 @@ enum class Transport : std::uint8_t { Tcp, Rtu };
 
 enum class Function : std::uint8_t { ReadHoldingRegisters = 3, ReadInputRegisters = 4 };
 
-inline constexpr std::size_t kMaxRegisters = 125;  ///< in one read
+inline constexpr std::size_t kMaxRegisters = 125;  ///< most registers in one read
 inline constexpr std::size_t kMaxAduSize = 260;    ///< TCP; RTU: 256
 inline constexpr std::uint16_t kTcpPort = 502;
 
 struct ReadRequest {
   std::uint8_t unit = 1;
   Function function = Function::ReadHoldingRegisters;
-  std::uint16_t address = 0;  ///< as on the wire, from 0
+  std::uint16_t address = 0;  ///< address on the wire, counted from 0
   std::uint16_t count = 1;    ///< registers, 1 to kMaxRegisters
   friend bool operator==(const ReadRequest&, const ReadRequest&) = default;
 };

@@ -15,7 +15,7 @@ namespace abbe::protocol::quad08 {
 inline constexpr std::uint16_t kVendor = 0x09DB;
 inline constexpr std::uint16_t kProduct = 0x00CA;
 inline constexpr std::uint8_t kScanEndpoint = 0x82;
-inline constexpr std::uint16_t kPacketSize = 512;  ///< of the scan endpoint, high speed
+inline constexpr std::uint16_t kPacketSize = 512;  ///< packet size of the scan endpoint, high speed
 inline constexpr std::uint8_t kConfiguration = 1;
 inline constexpr std::size_t kChannels = 8;
 inline constexpr double kPacerClock_hz = 48e6;

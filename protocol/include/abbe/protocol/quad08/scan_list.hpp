@@ -24,7 +24,7 @@ enum class CountWidth : std::uint8_t { Bits32, Bits48 };
 }
 
 struct ScanLayout {
-  std::array<std::uint8_t, kChannels> channels{};  ///< in the order of the list
+  std::array<std::uint8_t, kChannels> channels{};  ///< channels in the order of the list
   std::size_t count = 0;
   CountWidth width = CountWidth::Bits32;
 

@@ -23,8 +23,8 @@ class Faults {
   /// Faults with equal key and `what` are of one kind; an index in the key ("ball[3]") makes no
   /// difference.
   void add(std::size_t line, std::size_t column, std::string_view key, std::string_view what);
-  /// As add(), for a `what` that contains a value that differs from line to line: faults with equal
-  /// key and equal `kind` are of one kind.
+  /// Same as add(), for a `what` that contains a value that differs from line to line: faults with
+  /// equal key and equal `kind` are of one kind.
   void add_kind(std::string_view kind, std::size_t line, std::size_t column, std::string_view key,
                 std::string_view what);
   [[nodiscard]] bool any() const noexcept { return count_ > 0; }
@@ -41,7 +41,7 @@ class Faults {
   };
   struct Kind {
     std::string name;
-    std::vector<Fault> first = {};  // at most kEach, in the order of the file
+    std::vector<Fault> first = {};  // the first faults, at most kEach, in the order of the file
     std::size_t count = 0;          // a fault that is added several times counts once
   };
   struct Shown {

@@ -21,7 +21,7 @@ struct LiveProbing {
   double retract_m_per_s = 50e-3;
   double travel_m_per_s = 0.3;
   double acceleration_m_per_s2 = 5.0;
-  double delay_s = 5e-6;   ///< from contact to the edge
+  double delay_s = 5e-6;   ///< delay from the contact to the edge
   double jitter_s = 1e-6;  ///< standard deviation of the delay from touch to touch
   std::uint64_t seed = 1;
   // Fault injection: each set contains numbers of touches in the program, counted from 0.

@@ -17,9 +17,10 @@ enum class GaugeTravel : std::uint8_t { AlongBar, AlongGauge, AlongX };
 /// A step gauge as its certificate and its file state it, and its place.
 struct StepGauge {
   std::string name = "SG-1";
-  double step_m = 0.025;     ///< nominal step; the gauge is two steps longer than the bar
-  double u_m = 0.15e-6;      ///< standard uncertainty of a distance: the independent part,
-  double u_per_m = 0.75e-6;  ///< and the part proportional to the distance, common to all
+  double step_m = 0.025;  ///< nominal step; the gauge is two steps longer than the bar
+  double u_m = 0.15e-6;   ///< standard uncertainty of a distance: the independent part,
+  /// standard uncertainty of a distance: the part proportional to the distance, common to all
+  double u_per_m = 0.75e-6;
   double alpha_per_K = 11.5e-6, u_alpha_per_K = 0.2e-6;
   double temperature_C = 20.0, u_temperature_K = 0.02;
   /// y and z of the gauge's line relative to the bar's line
@@ -52,7 +53,7 @@ struct ReversalRun {
   std::vector<Measurement> plan;
   ProbedBar probed;
   std::vector<double> distances_m;  ///< distances of the gauge's faces, from the certificate
-  std::vector<std::vector<Eigen::Vector3d>> readings_m;  ///< by face and run
+  std::vector<std::vector<Eigen::Vector3d>> readings_m;  ///< readings by face and run
   /// position of the tip at the first face
   Eigen::Vector3d gauge_origin_m = Eigen::Vector3d::Zero();
 };

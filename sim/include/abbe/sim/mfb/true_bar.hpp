@@ -24,7 +24,7 @@ struct TruePlane {
 struct TrueBar {
   Pattern pattern;
   std::vector<TrueCylinder> holes, rods;
-  std::vector<std::array<TruePlane, 2>> planes;  ///< by Side
+  std::vector<std::array<TruePlane, 2>> planes;  ///< planes by Side
   /// Form error of the surface at each target, in the order of targets(): positive towards the tip,
   /// m. It contains no part that a least-squares fit of a feature's touches would see as a
   /// displacement of its axis or plane; such a part belongs to the place of the axis or plane.
@@ -33,12 +33,12 @@ struct TrueBar {
 
 /// Standard deviations of the deviations that are drawn for one bar.
 struct BarDeviations {
-  double position_m = 5e-6;  ///< of an axis or a plane, per coordinate
-  double bow_m = 10e-6;      ///< of the whole bar in y and z, in the middle
-  double pitch_m = 3e-6;     ///< of the distance of neighbouring holes
-  double tilt_rad = 100e-6;  ///< of axes and planes
-  double radius_m = 3e-6;    ///< of the radii of holes and rods
-  double form_m = 0.3e-6;    ///< of the surface at a target
+  double position_m = 5e-6;  ///< position of an axis or a plane, per coordinate
+  double bow_m = 10e-6;      ///< bow of the whole bar in y and z, in the middle
+  double pitch_m = 3e-6;     ///< distance of neighbouring holes
+  double tilt_rad = 100e-6;  ///< directions of axes and planes
+  double radius_m = 3e-6;    ///< radii of holes and rods
+  double form_m = 0.3e-6;    ///< form error of the surface at a target
   std::uint64_t seed = 1;
 };
 

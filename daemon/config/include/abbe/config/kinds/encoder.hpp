@@ -29,11 +29,12 @@ struct EncoderNodeConfig {
   double step = 1e-9;     ///< m or rad per count, signed
   double offset = 0.0;    ///< reading at count 0, m or rad
   drivers::AxisKind kind = drivers::AxisKind::Linear;
-  int tpdo = 1;           ///< 1 or 2: the TPDO with the position
-  int position_byte = 0;  ///< in the TPDO; External only, else read from the node
+  int tpdo = 1;  ///< 1 or 2: the TPDO with the position
+  /// byte in the TPDO at which the position begins; for External only, else read from the node
+  int position_byte = 0;
   /// Rotary: counts per revolution, after which the count wraps to 0. 0: read from the node.
   std::int64_t wrap_counts = 0;
-  std::optional<double> middle;  ///< of a rotary axis: middle of its travel, rad
+  std::optional<double> middle;  ///< rotary axis: middle of its travel, rad
 };
 
 struct EncoderConfig {
@@ -54,7 +55,7 @@ struct EncoderConfig {
   /// True: the control already corrects these readings. Then no model becomes ACTIVE and none can
   /// be identified, because a model would correct the same errors a second time.
   bool axes_compensated = false;
-  /// In the order of MachineConfig::axes; contains X, Y and Z.
+  /// The nodes in the order of MachineConfig::axes; contains X, Y and Z.
   std::vector<EncoderNodeConfig> nodes;
 };
 

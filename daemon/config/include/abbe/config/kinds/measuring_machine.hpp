@@ -27,7 +27,7 @@ struct CmmConfig {
   bool axes_compensated = true;
   std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds motion_timeout{std::chrono::seconds{120}};
-  /// Where the tip may be sent; nullopt: the travel of X, Y and Z.
+  /// The volume in which the tip may move; nullopt: the travel of X, Y and Z.
   std::optional<MotionBox> volume;
 };
 

@@ -24,7 +24,7 @@ enum class WeatherConfig { None, Read, Compute };
 /// mean value after another, for verification at standstills; on-the-fly runs are not possible.
 enum class TrackerModeConfig { Continuous, Stationary };
 
-/// How the tracker searches its reflector. One command of emScon sets both values.
+/// Search of the tracker for its reflector. One command of emScon sets both values.
 struct TrackerSearchConfig {
   double radius_m = 0.0;
   std::chrono::nanoseconds timeout{};  ///< time-out of the search; a whole number of ms
@@ -39,7 +39,7 @@ struct TrackerConfig {
   std::string host;
   std::uint16_t port = 700;
   TrackerModeConfig mode = TrackerModeConfig::Continuous;
-  double point_rate_hz = 500.0;  ///< only in mode Continuous
+  double point_rate_hz = 500.0;  ///< used only in mode Continuous
   /// duration of the measurement of one mean value; a whole number of ms
   std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};
   WeatherConfig weather = WeatherConfig::Compute;

@@ -74,7 +74,7 @@ struct LegBegun {
   AxisPosition q_m{}, p_tracker_m{};  ///< readings and tracker position at this point
 };
 
-/// What was added to a run since the last call of OtfAcquisition::take_news().
+/// The points and legs that were added to a run since the last call of OtfAcquisition::take_news().
 struct RunNews {
   std::vector<RunPoints::Chunk> chunks;  ///< full chunks only
   std::vector<RunPoint> tail;            ///< copy of all points behind the full chunks
@@ -143,7 +143,7 @@ class OtfAcquisition {
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
   /// Reason of the failure, or the event that is awaited.
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
-  /// What the run needs before it begins; null once it has begun.
+  /// The conditions that must hold before the run begins; null once it has begun.
   [[nodiscard]] const StartCheck* start() const noexcept {
     return phase_ == Phase::WaitingAtStart ? &start_ : nullptr;
   }
@@ -157,15 +157,15 @@ class OtfAcquisition {
   [[nodiscard]] bool has_live_tables() const noexcept {
     return mode_ == calib::otf::Mode::OnTheFly;
   }
-  /// What was added to the run since the last call. The cost does not depend on the length of the
-  /// run.
+  /// The points and legs that were added to the run since the last call. The cost does not depend
+  /// on the length of the run.
   [[nodiscard]] RunNews take_news();
   /// The points of the run; O(n).
   [[nodiscard]] std::vector<RunPoint> release() { return std::exchange(points_, {}).joined(); }
   /// The path of the request; O(1).
   [[nodiscard]] std::vector<AxisPosition> release_path() { return std::exchange(path_m_, {}); }
   [[nodiscard]] const AcquisitionOptions& options() const noexcept { return options_; }
-  [[nodiscard]] calib::otf::Mode mode() const noexcept { return mode_; }  ///< of the request
+  [[nodiscard]] calib::otf::Mode mode() const noexcept { return mode_; }  ///< mode of the request
   /// Lowest and highest temperature of the run; nullopt: not measured.
   [[nodiscard]] const std::optional<std::array<double, 2>>& temperature_K() const {
     return temperatures_.range_K();
@@ -201,7 +201,8 @@ class OtfAcquisition {
   StartCheck start_;
   std::string reason_;
   std::deque<RunPoint> before_;  // the last keep_before of the standstill at the first vertex
-  std::chrono::nanoseconds longest_stand_{};  // at the first vertex, before the run
+  // longest standstill at the first vertex, before the run
+  std::chrono::nanoseconds longest_stand_{};
   RunPoints points_;
   MeanEffect environment_;
   TemperatureRange temperatures_;

@@ -54,7 +54,8 @@ struct OtfTask {
   std::vector<calib::otf::TrackerObservation> points;
   calib::otf::Path path;
   calib::otf::Noise noise;
-  calib::otf::Options options;  ///< with progress and stop
+  /// options of the identification, with the callbacks for progress and stop
+  calib::otf::Options options;
   /// Scale readings with times of the machine's clock; they improve the component of the error
   /// along the path. Readings from another motion than the run are not used; a note in the
   /// observations states why.

@@ -18,7 +18,8 @@ namespace abbe::dds {
 /// A DATA_FRAG submessage from a writer of authentication messages. Its lengths are already
 /// checked.
 struct Fragment {
-  std::array<std::uint8_t, 20> header;  ///< of the RTPS message, with the prefix of the source
+  /// header of the RTPS message, with the prefix of the source
+  std::array<std::uint8_t, 20> header;
   bool little_endian;
   std::span<const std::uint8_t, 16> ids;  ///< ids of reader and writer, and the sequence number
   /// number of the first fragment, counted from 1; number of fragments; size of each

@@ -1,5 +1,5 @@
 #pragma once
-/// The addresses of a host name, looked up on threads of their own: a name service can take many
+/// The addresses of a host name, looked up on separate threads: a name service can take many
 /// seconds to answer, and a device thread that waits for it can send nothing, not even the command
 /// that stops a machine. An answer is kept while a later look-up runs or fails.
 

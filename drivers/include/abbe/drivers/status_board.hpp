@@ -85,7 +85,7 @@ class StatusBoard {
     fault_text_.set(at, text);
   }
 
-  /// Sets the condition: a text that says what is wrong from now on; empty: nothing is wrong.
+  /// Sets the condition: a text that states the fault from now on; empty: nothing is wrong.
   void set_condition(protocol::HostTime now, std::string_view text) ABBE_RT {
     condition_.set(now, text);
   }

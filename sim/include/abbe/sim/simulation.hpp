@@ -76,7 +76,7 @@ class Simulation {
                                                                 HostTime now);
 
   void poll(HostTime now);
-  /// Polls the encoders and their faults, with `bus_apart`. May run on a thread of its own; only
+  /// Polls the encoders and their faults, with `bus_apart`. May run on a separate thread; only
   /// this thread may then use bus().
   void poll_bus(HostTime now);
   [[nodiscard]] HostTime next_bus_due() const;

@@ -97,8 +97,8 @@ class DdsFeed {
   /// bridge.cycle().
   void cycle();
 
-  /// Tells abbed which other publisher claims to be this machine; empty: none. Call it in every
-  /// cycle.
+  /// Reports to abbed which other publisher claims to be this machine; empty: none. Call it in
+  /// every cycle.
   void report_twin(const std::string& seen);
 
   [[nodiscard]] bool connected() const noexcept;

@@ -1,6 +1,6 @@
 #pragma once
 /// Compares the scale readings at the vertices of the path with the path. If the path file is not
-/// the path that the control drives, the difference would appear in the model as an error of the
+/// the path that the control follows, the difference would appear in the model as an error of the
 /// machine. Not for the RT path; not thread-safe.
 
 #include <cstddef>

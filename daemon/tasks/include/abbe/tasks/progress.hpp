@@ -1,5 +1,5 @@
 #pragma once
-/// Reports the progress of a task, and tells the task when to stop.
+/// Reports the progress of a task, and signals the task when to stop.
 
 #include <functional>
 #include <string_view>

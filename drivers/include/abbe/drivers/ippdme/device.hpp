@@ -107,7 +107,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void measure(std::span<const ProbePoint> points);
   /// Any thread; takes no lock. Stops a motion in progress (AbortE) and discards all points. The
   /// session then awaits release(), whether or not the machine was moving. Returns the number of
-  /// the request; last_stop() tells its outcome.
+  /// the request; last_stop() returns its outcome.
   std::uint64_t abort();
   /// Any thread. The latest request that the session has received, and its outcome.
   [[nodiscard]] IppStop last_stop() const;

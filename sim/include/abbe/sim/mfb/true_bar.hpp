@@ -64,14 +64,14 @@ struct Contact {
 struct Sag {
   std::array<double, 2> beam_x_m{};      ///< ends of the beam
   std::array<double, 2> supports_m{};    ///< x of the supports
-  std::array<double, 2> section_yz_m{};  ///< height of the section in the directions y and z
+  std::array<double, 2> section_yz_m{};  ///< size of the cross-section in the directions y and z
   double density_kg_per_m3 = 8100.0;
   double youngs_modulus_Pa = 145e9;
 };
 /// The beam of the paper, scaled to the length of the pattern, with the supports that give the
 /// least sag.
 [[nodiscard]] Sag reference_sag(const Pattern& pattern);
-/// Sag at x, m. `height_m`: height of the section in the direction of bending.
+/// Sag at x, m. `height_m`: size of the cross-section in the direction of bending.
 [[nodiscard]] double sag_m(const Sag& sag, double height_m, double x_m);
 
 }  // namespace abbe::sim::mfb

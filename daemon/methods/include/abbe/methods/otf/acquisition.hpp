@@ -42,7 +42,7 @@ class RunPoints {
  public:
   static constexpr std::size_t kPointsInChunk = 1024;  // 56 KiB: a second of a fast tracker
   /// Shared, because the live tables read full chunks on another thread: these are not changed
-  /// while the run goes on.
+  /// while the run continues.
   using Chunk = std::shared_ptr<RunPoint[]>;
 
   void push_back(const RunPoint& point);
@@ -77,7 +77,7 @@ struct LegBegun {
 /// The points and legs that were added to a run since the last call of OtfAcquisition::take_news().
 struct RunNews {
   std::vector<RunPoints::Chunk> chunks;  ///< full chunks only
-  std::vector<RunPoint> tail;            ///< copy of all points behind the full chunks
+  std::vector<RunPoint> tail;            ///< copy of all points after the last full chunk
   std::vector<LegBegun> legs;
   EnvironmentEffect environment;  ///< mean of the run so far
 };
@@ -90,7 +90,7 @@ struct AcquisitionOptions {
   double vertex_tolerance_m = 2e-3;
   /// largest difference between readings and vertex, see VertexReadings
   double reading_tolerance_m = 20e-6;
-  /// If the machine is farther than this from every leg of the path, it drives another path, and
+  /// If the machine is farther than this from every leg of the path, it follows another path, and
   /// the run fails.
   double path_tolerance_m = 10e-3;
   /// Shortest standstill before the run. The default gives, at 100 Hz, the 20 points that calib

@@ -1,6 +1,6 @@
 #pragma once
-/// Compares scale readings along a driven path, from a file, with the vertices of the path, for
-/// `identify otf --encoder`. The daemon makes the same comparison live (VertexReadings).
+/// For `identify otf --encoder`: compares the scale readings of a run, from a file, with the
+/// vertices of the path. The daemon makes the same comparison live (VertexReadings).
 
 #include <cstddef>
 #include <span>

@@ -47,7 +47,7 @@ class StartCheck {
   /// Detects streams that have stopped. `now`: host time.
   void tick(protocol::HostTime now);
 
-  /// All conditions hold: the machine may drive off.
+  /// All conditions hold: the machine may start the run.
   [[nodiscard]] bool ready() const noexcept { return ready_; }
   /// The machine has left the first vertex along its first leg, and the run has not begun. True
   /// until all conditions hold again.
@@ -55,8 +55,8 @@ class StartCheck {
   /// The condition that did not hold when the machine last stood at the first vertex; empty: all
   /// held.
   [[nodiscard]] const std::string& missing_at_start() const noexcept { return missing_at_start_; }
-  /// Message for the operator: what to wait for, that the machine may drive off, or what was
-  /// missing when it drove off.
+  /// Message for the operator: what to wait for, that the machine may start the run, or what was
+  /// missing when it started.
   [[nodiscard]] std::string text() const;
   /// The conditions in the order in which the operator has to satisfy them: tracker, axes,
   /// position, standstill. They are at most a tenth of a second old, or 1.5 s if the tracker sends

@@ -18,17 +18,19 @@ namespace {
 constexpr double kRounding = 1e-12;  // m or rad
 constexpr double kNeverFits = std::numeric_limits<double>::infinity();
 constexpr std::size_t kLeastDof = 3;
-constexpr double kMostOutside = 0.3;  // share of positions that a correction may lose
+constexpr double kMostOutside = 0.3;  // largest share of the positions that a correction may move
+                                      // outside the nodes of the model
 
 /// The measured values after a correction.
 struct CorrectedValues {
   std::string text;
   std::vector<double> positions_m;  // any order
   Eigen::VectorXd values;
-  std::size_t parameters = 0;  // of the correction, estimated from the values
+  std::size_t parameters = 0;  // number of parameters of the correction that are estimated from the
+                               // values
 };
 
-/// Those positions that the model covers, ascending.
+/// The corrected values at positions that the model covers, by ascending position.
 CorrectedValues covered(const ModelCurve& curve, const CorrectedValues& all) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < all.positions_m.size(); ++i) {
@@ -48,7 +50,7 @@ CorrectedValues covered(const ModelCurve& curve, const CorrectedValues& all) {
   return out;
 }
 
-/// Compares corrections of one table.
+/// Tries corrections of the measured values of one table and compares the remaining differences.
 class CauseSearch {
  public:
   CauseSearch(const ModelCurve& curve, std::span<const double> positions_m,
@@ -66,7 +68,8 @@ class CauseSearch {
 
   [[nodiscard]] double rms_as_given() const { return rms(given_); }
 
-  /// Root of the sum of squares by the degrees of freedom.
+  /// Square root of (sum of squared differences / degrees of freedom) after the correction.
+  /// Infinite if too few positions remain.
   [[nodiscard]] double rms(const CorrectedValues& corrected) const {
     const CorrectedValues c = covered(curve_, corrected);
     const double least = (1.0 - kMostOutside) * static_cast<double>(given_.positions_m.size());
@@ -82,7 +85,7 @@ class CauseSearch {
     return std::sqrt(left.squaredNorm() / static_cast<double>(c.positions_m.size() - used));
   }
 
-  /// Repeats the test of the table with corrected values.
+  /// True if the corrected values pass the test of the table (compare.hpp).
   [[nodiscard]] bool fits(const CorrectedValues& corrected, const CauseTest& test) const {
     const CorrectedValues c = covered(curve_, corrected);
     const Eigen::MatrixXd P =
@@ -143,7 +146,8 @@ class CauseSearch {
     }
   }
 
-  /// A factor that brings all positions to nearly one place would hide every difference.
+  /// Factors below kLeastShare are not tried: a factor that moves all positions to nearly one place
+  /// would hide every difference.
   void add_units_of_positions(std::vector<CorrectedValues>& all) const {
     constexpr double kLeastShare = 0.1;  // of the length of the table
     const std::vector<double>& nodes_m = curve_.nodes().nodes_m;
@@ -227,8 +231,8 @@ class CauseSearch {
     all.push_back(shifted(best_m));
   }
 
-  /// d = (eps x l)_k of a translation k, l: constant lever. Each component j of l has the column
-  /// eps_r (e_r x e_j)_k of the rotation r about the third direction.
+  /// Error d of translation k from a constant lever l: d = (eps x l)_k, eps: rotations of the axis.
+  /// For component j of l the column is eps_r (e_r x e_j)_k, r: the third direction.
   void add_lever(std::vector<CorrectedValues>& all) const {
     const ErrorMotion motion = curve_.motion();
     if (is_rotation(motion.motion)) {
@@ -274,7 +278,8 @@ class CauseSearch {
   StraightnessLine line_;
   Eigen::MatrixXd P_;
   Eigen::VectorXd z_, y_;   // measured values and model in the convention
-  std::size_t shapes_ = 0;  // nodes of the model in the range: its curve has no more parameters
+  std::size_t shapes_ = 0;  // number of nodes of the model in the measured range; its curve has at
+                            // most as many parameters there
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
-/// Why a directly measured error does not fit a model: mistakes that people make with such files.
+/// Finds why a directly measured error does not fit a model: typical mistakes in files of measured
+/// values.
 
 #include <span>
 #include <string>
@@ -12,7 +13,7 @@
 
 namespace abbe::calib::direct {
 
-/// What the test of corrected values needs.
+/// Quantities for the test of corrected values.
 struct CauseTest {
   Scatter scatter;
   std::size_t runs = 0;
@@ -20,13 +21,14 @@ struct CauseTest {
   Limits limits{};
 };
 
-/// The corrections of the measured values with which they are closer to the model: the rms
+/// Returns the corrections of the measured values that bring them closer to the model: the rms
 /// difference is at most a third of that of the given values, and at most 1.5 times that of the
-/// best correction. Degrees of freedom: positions without the conditions of the convention and
-/// without the parameters of the correction. They begin with "fits" if no corrected value exceeds
-/// its limit, else with "closer"; also without a test. Empty if nothing helps, or with fewer than 3
-/// degrees of freedom. A correction with as many parameters as the model has nodes in the range,
-/// without those conditions, would fit anything and is not tried.
+/// best correction. The degrees of freedom of an rms are the number of positions, less the
+/// conditions of the convention, less the parameters of the correction. A text begins with "fits"
+/// if a CauseTest is given and no corrected value exceeds its limit, else with "closer". The result
+/// is empty if no correction helps, or with fewer than 3 degrees of freedom. A correction must have
+/// fewer parameters than the model has nodes in the range, less the conditions of the convention;
+/// otherwise it would fit any values and is not tried.
 ///
 /// Tried: the sign; the positions reversed or counted from the other end, with either sign; a
 /// factor (unit); a slope of a positioning error (temperature, wavelength, scales); an offset of

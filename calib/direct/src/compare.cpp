@@ -18,14 +18,15 @@
 namespace abbe::calib::direct {
 namespace {
 
-/// An error with its runs at the common positions.
+/// One error, with its runs at the positions that measurement and model have in common.
 struct Reduced {
   TableComparison table;
-  Runs runs;                 // at the common positions
+  Runs runs;
   Eigen::VectorXd measured;  // mean over the runs, before the convention
   std::optional<LineChange> lines{};
   Scatter scatter{};
-  double change = 0.0;  // squareness: part of `measured` that is not in the readings
+  double change = 0.0;  // for a squareness: part of `measured` that squareness_change() added to
+                        // the readings
 };
 
 bool is_squareness_name(std::string_view name) {
@@ -162,7 +163,8 @@ Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricM
   return out;
 }
 
-/// Causes of a squareness: one value can only show its sign.
+/// Adds a likely cause for a squareness. It has one value, so that only a reversed sign can be
+/// tested.
 void add_squareness_cause(Reduced& r) {
   const PointDifference& point = r.table.points.front();
   const double reversed = std::abs(2.0 * r.change - point.measured - point.model);
@@ -219,7 +221,8 @@ Result<std::vector<TableComparison>> compare(std::span<const MeasuredError> erro
   }
 
   std::vector<Reduced> all(errors.size());
-  for (const bool squareness : {false, true}) {  // squareness needs the lines of the straightness
+  for (const bool squareness : {false, true}) {  // the squareness errors come second: they need the
+                                                 // straightness lines
     for (std::size_t i = 0; i < errors.size(); ++i) {
       const auto motion = error_motion(errors[i].name);
       if (motion.has_value() == squareness) {

@@ -14,7 +14,7 @@ Eigen::VectorXd as_vector(std::span<const double> values) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-/// Row w such that w * values is the value that the line has at its own origin `at_m`.
+/// Row w: w * values is the value that the fitted line has at its origin `at_m`.
 Eigen::RowVectorXd value_row(std::span<const double> positions_m, StraightnessLine line,
                              double at_m) {
   const auto n = static_cast<Eigen::Index>(positions_m.size());
@@ -76,7 +76,7 @@ Eigen::MatrixXd reduction(ErrorMotion motion, std::span<const double> positions_
   return P;
 }
 
-/// W such that W * values at the positions is the linear interpolation at the nodes.
+/// Matrix W: W * (values at the positions) is the linear interpolation at the nodes.
 Eigen::MatrixXd interpolation_matrix(std::span<const double> positions_m,
                                      std::span<const double> nodes_m) {
   Eigen::MatrixXd W = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(nodes_m.size()),

@@ -1,5 +1,5 @@
 #pragma once
-/// Runs and uncertainty of the device at chosen positions.
+/// Selects positions of runs, and computes the covariance from the uncertainty of the device.
 
 #include <Eigen/Core>
 #include <functional>

@@ -11,7 +11,8 @@
 namespace abbe::calib::direct {
 namespace {
 
-/// A smaller uncertainty is rounding: the convention fixes the value there. m or rad.
+/// An uncertainty below this (m or rad) is a rounding error: the convention sets the value to zero
+/// at this position.
 constexpr double kFixedByConvention = 1e-9;
 
 /// Values and variances of one position, before the test.
@@ -83,7 +84,7 @@ void add_points(TableComparison& table, const Runs& runs, const Eigen::VectorXd&
                                         known));
   }
   add_statistics(table);
-  table.finding = Finding::NotTested;  // judged later
+  table.finding = Finding::NotTested;  // until judge() sets it
 }
 
 std::size_t count_tests(const TableComparison& table) {
@@ -93,7 +94,8 @@ std::size_t count_tests(const TableComparison& table) {
 }
 
 Limits limits_of(double p, std::size_t dof) {
-  constexpr std::size_t kNormal = 1000;  // up to 1 % above the normal quantile, and fast
+  constexpr std::size_t kNormal = 1000;  // as good as infinite: its quantile is at most 1 % above
+                                         // the normal one
   return {dof > 0 ? student_quantile(p, dof) : 0.0, student_quantile(p, kNormal)};
 }
 

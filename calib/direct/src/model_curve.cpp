@@ -3,7 +3,7 @@
 namespace abbe::calib::direct {
 namespace {
 
-/// Row of the table itself at a position.
+/// Row that gives the value of the table at a position when multiplied by U.
 Eigen::RowVectorXd table_row(const VolumetricModel& model, ErrorMotion motion, double position_m) {
   const TableBasis& basis = *model.tables();
   const std::size_t offset = basis.layout().find(motion)->offset;
@@ -15,7 +15,7 @@ Eigen::RowVectorXd table_row(const VolumetricModel& model, ErrorMotion motion, d
   return row;
 }
 
-/// Row of one component of V at an axis position.
+/// Row that gives one component of V at the axis positions q_m when multiplied by U.
 Eigen::RowVectorXd component_row(const TableBasis& basis, const Vector3& tool_m, const Vector3& q_m,
                                  std::size_t component) {
   std::vector<Column> memory(basis.most_columns());

@@ -10,28 +10,28 @@
 
 namespace abbe::calib::direct {
 
-/// Rows A such that A * U is the component of V of a translation error along its axis, on the line
-/// through line_m.
+/// Matrix A with one row per position: A * U is the component of V in the direction of the
+/// translation error, along its axis on the line through line_m.
 [[nodiscard]] Eigen::MatrixXd rows_along(const TableBasis&, const Vector3& tool_m,
                                          ErrorMotion translation, const Vector3& line_m,
                                          std::span<const double> positions_m);
 
-/// Refers to the model and must not outlive it.
+/// Values and covariance of one error motion. Refers to the model, which must outlive it.
 class ModelCurve {
  public:
-  /// `line_m`: see MeasuredError; it changes translations only. The model has the table of
+  /// `line_m`: see MeasuredError; it changes translations only. The model must have the table of
   /// `motion`.
   ModelCurve(const VolumetricModel& model, ErrorMotion motion,
              const std::optional<Vector3>& line_m = std::nullopt);
 
   [[nodiscard]] ErrorMotion motion() const { return motion_; }
   [[nodiscard]] const AxisNodes& nodes() const;
-  /// Within the nodes, with a tolerance of 1 um for readings at the end of the travel.
+  /// True within the nodes, with a tolerance of 1 um for readings at the end of the travel.
   [[nodiscard]] bool covers(double position_m) const;
-  /// values(p) = rows(p) * U of the model.
+  /// Matrix with one row per position: values(p) = rows(p) * U, U: parameters of the model.
   [[nodiscard]] Eigen::MatrixXd rows(std::span<const double> positions_m) const;
   [[nodiscard]] Eigen::VectorXd values(std::span<const double> positions_m) const;
-  /// Of rows B of values().
+  /// Covariance of B * U, for example with B = rows(p).
   [[nodiscard]] Eigen::MatrixXd covariance(const Eigen::MatrixXd& B) const {
     return B * model_->covariance() * B.transpose();
   }

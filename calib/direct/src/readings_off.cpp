@@ -12,9 +12,9 @@ namespace {
 
 constexpr std::size_t kFewestPositions = 5;
 constexpr double kMostScales = 20.0, kMostSteps = 5.0, kFileResolution = 1e-7;
-constexpr double kSameValue = 1e-12, kCoarsest = 1e-5;  // rounding; a dial gauge
+constexpr double kSameValue = 1e-12, kCoarsest = 1e-5;  // rounding; resolution of a dial gauge
 
-/// The readings of one direction of one run, by position.
+/// Indices of the readings of one direction of one run, by ascending position.
 using Pass = std::vector<std::size_t>;
 
 std::vector<Pass> passes_of(const MeasuredError& error) {
@@ -41,7 +41,7 @@ double off_line(const MeasuredError& error, std::size_t at, std::size_t a, std::
   return p.value - ((1.0 - share) * from.value + share * to.value);
 }
 
-/// Curvature of every reading of the passes, by reading.
+/// Curvature of each reading; the key is the index of the reading.
 using Curvatures = std::map<std::size_t, double>;
 
 Curvatures curvatures_of(const MeasuredError& error, const std::vector<Pass>& passes) {
@@ -80,7 +80,8 @@ Curvatures deviations_of(const MeasuredError& error, const std::vector<Pass>& pa
   return d;
 }
 
-/// Smallest difference of two values, beyond rounding; 0 if it is that of no instrument.
+/// Smallest difference of two values that is more than rounding. 0 if it is larger than the
+/// resolution of any instrument (kCoarsest).
 double resolution_of(const MeasuredError& error) {
   std::vector<double> values;
   for (const Reading& reading : error.readings) {
@@ -115,7 +116,7 @@ double largest_in(const Curvatures& d, const Pass& pass) {
   return largest;
 }
 
-/// The passes without the readings at the places `left_out` of one of them.
+/// All passes; pass `number` without the readings in `left_out`.
 std::vector<Pass> passes_without(std::vector<Pass> passes, std::size_t number,
                                  const Pass& left_out) {
   std::erase_if(passes[number], [&](std::size_t reading) {
@@ -124,10 +125,12 @@ std::vector<Pass> passes_without(std::vector<Pass> passes, std::size_t number,
   return passes;
 }
 
-/// Readings of the pass that may be off: those beyond the limit and their neighbours, whose
-/// curvature may be within the limit by chance. Empty for more than two readings that are off.
+/// Readings of the pass that may be wrong: those with |d| above the limit, and their neighbours.
+/// The neighbours are included because the |d| of a wrong reading may be below the limit by chance.
+/// Empty if there are more candidates than two wrong readings can explain.
 Pass candidates_of(const Curvatures& d, const Pass& pass, double limit) {
-  constexpr std::size_t kMost = 12;  // each that is off changes the curvature of two others
+  constexpr std::size_t kMost = 12;  // one wrong reading also changes the curvature of its two
+                                     // neighbours
   Pass candidates;
   for (std::size_t k = 0; k < pass.size(); ++k) {
     const std::size_t first = k < 1 ? 0 : k - 1, last = std::min(k + 1, pass.size() - 1);
@@ -141,8 +144,8 @@ Pass candidates_of(const Curvatures& d, const Pass& pass, double limit) {
   return candidates.size() <= kMost ? candidates : Pass{};
 }
 
-/// The one or two readings of the pass without which the largest |d| of the pass is within the
-/// limit, and least. Empty if there are none.
+/// The one or two readings without which the largest |d| of the pass is smallest and within the
+/// limit. Empty if there are none.
 Pass culprits_of(const MeasuredError& error, const std::vector<Pass>& passes, std::size_t number,
                  const Curvatures& d, double limit) {
   const Pass candidates = candidates_of(d, passes[number], limit);

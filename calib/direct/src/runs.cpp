@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kForward = 0, kBackward = 1;
 
-/// The values of one run by target, one entry per direction.
+/// Values of one run: for every target one optional value per direction (forward, backward).
 struct RunValues {
   std::map<std::size_t, std::array<std::optional<double>, 2>> at;
 
@@ -27,7 +27,8 @@ struct RunValues {
   }
 };
 
-/// Ascending; positions closer than kSameTarget_m are one target, at the first of them.
+/// Positions of the targets, ascending. Positions that differ by less than kSameTarget_m are one
+/// target, at the first of them.
 std::vector<double> targets_of(const MeasuredError& error) {
   std::vector<double> positions;
   for (const Reading& r : error.readings) {
@@ -64,8 +65,8 @@ Result<std::map<int, RunValues>> by_run(const MeasuredError& error,
   return runs;
 }
 
-/// True if the runs are numbered as laser programs do, forward 1, backward 2, forward 3, ...: each
-/// has one direction, and they alternate.
+/// True if each run has one direction and the directions alternate (forward 1, backward 2, forward
+/// 3, ...). Programs of laser interferometers number runs in this way.
 bool alternate(const std::map<int, RunValues>& runs) {
   std::size_t previous = 2;
   for (const auto& [number, run] : runs) {
@@ -91,7 +92,8 @@ std::string advice_on_directions(const std::map<int, RunValues>& runs) {
       " both 1, the next two both 2, and so on (1, 1, 2, 2, ...)");
 }
 
-/// BadInput unless all runs have the same directions; else whether they have both.
+/// For forward and backward: whether the runs have this direction. BadInput unless all runs have
+/// the same directions.
 Result<std::array<bool, 2>> directions_of(const std::string& name,
                                           const std::map<int, RunValues>& runs) {
   const RunValues& first = runs.begin()->second;
@@ -123,9 +125,10 @@ std::vector<std::size_t> complete_targets(const std::map<int, RunValues>& runs, 
   return complete;
 }
 
-/// The largest distance of a position of the first run and direction from the nearest one of
-/// another, and the smallest distance of its positions: readings instead of targets scatter by much
-/// less than the targets are apart.
+/// Tells whether positions are readings instead of targets: such positions scatter by much less
+/// than the targets are apart. `largest_m`: largest distance of a position of the first pass from
+/// the nearest one of another pass. `spacing_m`: smallest distance between positions of the first
+/// pass.
 struct PositionScatter {
   double largest_m = 0.0, spacing_m = std::numeric_limits<double>::infinity();
 };
@@ -167,9 +170,11 @@ PositionScatter position_scatter_of(const std::vector<std::vector<double>>& pass
   return scatter;
 }
 
-/// Why no position occurs in all runs, if the positions are readings instead of targets.
+/// Message that explains why no position occurs in all runs: the positions are readings instead of
+/// targets.
 std::string scatter_text(const std::map<int, RunValues>& runs, const std::vector<double>& targets) {
-  constexpr double kReadings = 0.25;  // of the spacing: the assignment to a target is clear
+  constexpr double kReadings = 0.25;  // of the spacing: up to here each reading belongs clearly to
+                                      // one target
   const PositionScatter scatter = position_scatter_of(positions_by_pass(runs, targets));
   const std::string limit = message("; positions that differ by more than ",
                                     kMmPerM * kSameTarget_m, " mm are different targets");

@@ -9,7 +9,8 @@
 namespace abbe::calib::direct {
 namespace {
 
-/// Removes by least squares what the convention removes: an offset, of a straightness also a slope.
+/// Operator that removes by least squares what the convention removes: an offset, and for a
+/// straightness also a slope.
 Eigen::MatrixXd residual_operator(const Runs& runs, const std::optional<ErrorMotion>& motion) {
   const auto m = static_cast<Eigen::Index>(runs.positions_m.size());
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(m, m);
@@ -24,7 +25,8 @@ Eigen::MatrixXd residual_operator(const Runs& runs, const std::optional<ErrorMot
   return one - N * (N.transpose() * N).ldlt().solve(N.transpose());
 }
 
-/// Share of independent values, from the correlation of neighbours: AR(1).
+/// Number of independent values divided by the number of values, from the correlation of
+/// neighbouring positions (autoregressive process of order 1).
 double independent_share(double squares, double neighbours) {
   const double rho = squares > 0.0 ? std::clamp(neighbours / squares, 0.0, 1.0) : 0.0;
   return (1.0 - rho * rho) / (1.0 + rho * rho);

@@ -22,7 +22,7 @@ constexpr std::array kSlopeTerms{
     SlopeTerm{"EB0Z", {Motion::X, Axis::Z}, 1.0},  SlopeTerm{"EB0Z", {Motion::Z, Axis::X}, 1.0},
     SlopeTerm{"EA0Z", {Motion::Y, Axis::Z}, -1.0}, SlopeTerm{"EA0Z", {Motion::Z, Axis::Y}, -1.0}};
 
-/// 0 if the straightness has no effect on the squareness.
+/// Factor of the slope of the straightness in the squareness; 0 if it has no effect.
 double slope_factor(const std::string& squareness, ErrorMotion straightness) {
   const auto found = std::find_if(kSlopeTerms.begin(), kSlopeTerms.end(), [&](const SlopeTerm& t) {
     return t.squareness == squareness && t.straightness == straightness;

@@ -16,9 +16,10 @@
 namespace abbe::calib::direct {
 namespace {
 
-constexpr auto kLine = StraightnessLine::EndPoints;  // datum G2
+constexpr auto kLine = StraightnessLine::EndPoints;  // the straightness line of datum G2
 
-/// Those of the positions that are in the range of all tables of the axis, without near duplicates.
+/// Nodes of the axis: all measured positions that lie in the range of all its tables, without near
+/// duplicates.
 Result<AxisNodes> common_nodes(const std::vector<UsedError>& used, Axis axis,
                                const AxisNodes& of_model) {
   double first_m = -1e300, last_m = 1e300;
@@ -52,7 +53,7 @@ Result<AxisNodes> common_nodes(const std::vector<UsedError>& used, Axis axis,
   return nodes;
 }
 
-/// Builds the parameters of both sides in the common layout.
+/// Computes the parameters of the measured errors and of the model in the common layout.
 class CommonTables {
  public:
   CommonTables(const std::vector<UsedError>& used, const ParameterLayout& layout,
@@ -61,7 +62,7 @@ class CommonTables {
         layout_(layout),
         model_(model),
         device_(device),
-        basis_(TableBasis::of(layout).value()) {  // linear: no limit of nodes
+        basis_(TableBasis::of(layout).value()) {  // linear interpolation: any number of nodes
     const auto n = static_cast<Eigen::Index>(layout.model_size());
     convention_ = Eigen::MatrixXd::Identity(n, n);
     for (const UsedError& u : used_) {
@@ -119,13 +120,13 @@ class CommonTables {
            (found - kSquarenessNames.begin());
   }
   [[nodiscard]] const Vector3& tool_m() const { return model_.tool_offsets_m().front(); }
-  /// From the slopes of V along the measured lines to the squareness parameter of the common
-  /// tables.
+  /// Adds the rows that convert the slopes of V along the measured lines to the squareness
+  /// parameter of the common tables.
   void add_squareness_rows() {
     squareness_ = Eigen::MatrixXd::Identity(convention_.rows(), convention_.rows());
     for (const UsedError& u : used_) {
       if (!u.motion) {
-        squareness_.row(squareness_place(u.error->name)) *= 2.0;  // its own coefficient is 1
+        squareness_.row(squareness_place(u.error->name)) *= 2.0;
         squareness_.row(squareness_place(u.error->name)) -=
             squareness_row(u.error->name, basis_, tool_m(), *u.error->line_m, lines_, kLine);
       }
@@ -138,7 +139,8 @@ class CommonTables {
     return layout_.nodes()[index(motion.axis)].reference_m;
   }
 
-  /// Covariance of W mean() from the scatter, enlarged for its few degrees of freedom.
+  /// Covariance of W mean() from the scatter of the runs, enlarged because the scatter has few
+  /// degrees of freedom.
   [[nodiscard]] static Eigen::MatrixXd scatter_covariance(const UsedError& u,
                                                           const Eigen::MatrixXd& W) {
     const Scatter scatter = scatter_of(u.runs, u.motion);

@@ -1,5 +1,5 @@
 #pragma once
-/// Measured errors and a model as parameters of the same tables on the same nodes; see
+/// Expresses measured errors and a model as parameters of the same tables on the same nodes; see
 /// abbe/calib/direct/volume.hpp.
 
 #include <Eigen/Core>
@@ -11,27 +11,28 @@
 
 namespace abbe::calib::direct {
 
-/// A measured error that the model has.
+/// A measured error for which the model has a table or squareness.
 struct UsedError {
   const MeasuredError* error;
   std::optional<ErrorMotion> motion;  // nullopt: squareness
-  Runs runs;                          // within the nodes of the model
+  Runs runs;                          // at positions within the nodes of the model
   Runs all;
 };
 struct UsableErrors {
   std::vector<UsedError> used;
-  std::vector<LeftOut> left_out;  // of those that the model has
+  std::vector<LeftOut> left_out;  // errors that the model has and that cannot be used
 };
-/// Used: those with at least three positions within the nodes of the model, and every squareness.
+/// Divides the measured errors. Used: errors with at least three positions within the nodes of the
+/// model, and every squareness.
 [[nodiscard]] Result<UsableErrors> usable_errors(std::span<const MeasuredError>,
                                                  const VolumetricModel&);
 /// Leaves out each squareness that cannot be compared on the common nodes.
 void leave_out_squareness(UsableErrors&, const ParameterLayout&);
-/// The tables of the used errors, on the nodes that they have in common.
+/// Layout of the tables of the used errors, on the nodes that they have in common.
 [[nodiscard]] Result<ParameterLayout> common_layout(const std::vector<UsedError>&,
                                                     const VolumetricModel&);
 
-/// Parameters of the common layout with their covariance, in datum G2.
+/// Parameters U of the common layout with their covariance, in datum G2.
 struct TableValues {
   Eigen::VectorXd U;
   Eigen::MatrixXd cov_U;

@@ -23,7 +23,8 @@ Result<VolumetricModel> model_of(const ParameterLayout& layout, const TableValue
                                       values.U, symmetric, std::move(*validity));
 }
 
-/// At most about 21 nodes per axis, with both ends, inside the validity volume of the model.
+/// Points of a grid inside the validity volume of the model, with at most about 21 nodes per axis
+/// including both ends.
 std::vector<Vector3> grid_of(const MachineNodes& nodes, const VolumetricModel& model) {
   constexpr std::size_t kCells = 20;
   MachineNodes few = nodes;
@@ -87,7 +88,7 @@ Result<VolumeComparison> compare_in_volume(std::span<const MeasuredError> errors
                                            const VolumetricModel& model,
                                            const DeviceUncertainty& device) {
   if (const auto tables = compare(errors, model, {.device = device}); !tables) {
-    return tl::make_unexpected(tables.error());  // names, options, runs
+    return tl::make_unexpected(tables.error());  // reports wrong names, options or runs
   }
   auto usable = usable_errors(errors, model);
   ABBE_TRY(usable);

@@ -39,7 +39,7 @@ double compressibility(double p_Pa, double T_K, double x_v) {
          p_T * p_T * (1.83e-11 - 0.765e-8 * x_v * x_v);
 }
 
-/// [Ciddor 1996] appendix B.
+/// Refractive index n, [Ciddor 1996] appendix B.
 double ciddor(const Air& air, double wavelength_m) {
   const double S = per_square_um(wavelength_m);
   const double T = air.temperature_K;
@@ -119,7 +119,8 @@ double share_of_co2(const Air& air, double wavelength_m, IndexEquation equation)
 struct Range {
   double min = 0.0, max = 0.0;
   [[nodiscard]] double mean() const { return 0.5 * (min + max); }
-  [[nodiscard]] double u() const { return 0.5 * (max - min) / std::numbers::sqrt3; }  // rectangular
+  // standard uncertainty of a rectangular distribution
+  [[nodiscard]] double u() const { return 0.5 * (max - min) / std::numbers::sqrt3; }
 };
 
 bool within(double value, double min, double max) {

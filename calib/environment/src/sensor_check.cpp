@@ -15,10 +15,11 @@ using std::chrono::nanoseconds;
 
 constexpr double kIceInKelvin = 273.15;
 constexpr std::array kPowerOnValues_C{85.0, 127.0, -127.0, 0.0};
-/// Rounding of a register value times its scale; below the resolution of every sensor.
+/// Tolerance of the comparison: larger than the rounding of a register value times its scale,
+/// smaller than the resolution of every sensor.
 constexpr double kSameValue_K = 1e-4;
-/// Doubt after which the tolerance is twice its value: a machine that warms up by 10 K/h has then
-/// changed by the default tolerance of a temperature, 0.5 K.
+/// Duration of a doubt after which the tolerance has doubled. In this time a machine that warms up
+/// by 10 K/h changes by 0.5 K, the default tolerance of a temperature.
 constexpr std::chrono::minutes kToleranceDoubles{3};
 
 double elapsed_seconds(nanoseconds d) noexcept {
@@ -66,8 +67,8 @@ CheckedReading check_rate(SensorTrack& track, const SensorLimits& limits, double
     return expected;
   }
 
-  // After a doubt the reading itself is the reference: it may differ by more than the change that
-  // was possible.
+  // At the end of a doubt the reading itself becomes the reference: it may differ from the old
+  // reference by more than the change that was possible.
   const bool doubted = track.doubted_since.has_value();
   track.reference = doubted ? reading : moved_towards(track.reference, reading, possible);
   track.doubted_since.reset();

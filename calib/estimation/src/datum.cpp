@@ -14,8 +14,8 @@
 namespace abbe::calib::estimation {
 namespace {
 
-/// Names of the unknowns with the largest share in the directions that are not determined. A share
-/// is the square of an entry of a unit vector; those of unknowns that are determined are rounding.
+/// Names of the unknowns with the largest share in the combinations that are not determined. A
+/// share is the squared entry of a unit vector. Shares of determined unknowns are rounding errors.
 std::string largest_shares(const Eigen::VectorXd& shares, const DatumOptions& options) {
   std::vector<std::size_t> order(static_cast<std::size_t>(shares.size()));
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -85,7 +85,7 @@ Result<void> check_solvable(const Information& data, const DatumOptions& options
   return check_every_unknown(data, options);
 }
 
-/// The rows of the data and the conditions K for the unknowns divided by `scale`.
+/// Information of the data rows and the conditions K, for the unknowns divided by `scale`.
 Information bordered_rows(const Information& data, const Eigen::MatrixXd& K,
                           const Eigen::VectorXd& scale, double weight) {
   Information bordered(data.unknowns());
@@ -94,7 +94,8 @@ Information bordered_rows(const Information& data, const Eigen::MatrixXd& K,
   return bordered;
 }
 
-/// The unknowns that neither data of this rank nor the conditions determine.
+/// RankDeficient, with the names of the unknowns, if data of this rank and the conditions together
+/// do not determine all unknowns.
 Result<void> check_rank(const Information& data, std::size_t rank, const Eigen::MatrixXd& K,
                         const DatumOptions& options) {
   const std::size_t with_conditions = rank + static_cast<std::size_t>(K.rows());

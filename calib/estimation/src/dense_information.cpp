@@ -11,7 +11,7 @@ Information information_of(const Eigen::MatrixXd& A, const Eigen::VectorXd& y) {
   const Eigen::VectorXd turned = qr.householderQ().adjoint() * y;
   const Eigen::MatrixXd R = qr.matrixQR().topRows(m).triangularView<Eigen::Upper>();
 
-  // Adding a triangle to no information changes only signs of rows.
+  // `information` is empty, so that adding the triangle R changes at most the signs of its rows.
   Information information(static_cast<std::size_t>(A.cols()));
   information.add_rows(R, turned.head(m));
   information.add_rest(turned.tail(outside).squaredNorm(), static_cast<std::size_t>(outside));

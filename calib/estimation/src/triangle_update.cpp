@@ -13,7 +13,7 @@ namespace {
 struct Reflection {
   double tau = 0.0;
   std::vector<double*> rows;  ///< rows that are not zero in the column
-  std::vector<double> v;      ///< of these rows
+  std::vector<double> v;      ///< elements of v for these rows
 };
 
 /// Computes the reflection of a column and the new diagonal element, which is not negative.
@@ -32,8 +32,9 @@ void reflect_column(Reflection& r, double& diagonal, double* rows, std::size_t c
     }
   }
 
-  // Rounding of rounding: where the rows state nothing about some unknowns, what remains of them is
-  // smaller by 16 digits from column to column. Below 1e-154 its squares are zero.
+  // The sum is zero by underflow: where the rows contain nothing about some unknowns, the rounding
+  // errors that remain become smaller by 16 digits from column to column. Squares of values below
+  // 1e-154 are zero.
   if (squares == 0.0) {
     r.rows.clear();
     return;

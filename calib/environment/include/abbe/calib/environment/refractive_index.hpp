@@ -53,8 +53,8 @@ inline constexpr double kCo2PerPpm = 5.34e-7;
 /// to 1000 ppm of CO2.
 [[nodiscard]] Air shop_floor_air() noexcept;
 
-/// Relative standard uncertainty of distances that are corrected with `assumed` air instead of
-/// measured air:
+/// Relative standard uncertainty of distances that are corrected with the index n_assumed of the
+/// `assumed` air instead of the index of measured air:
 ///     hypot(u_n, n - n_assumed) / n,   n and u_n of shop_floor_air().
 /// BadInput as refractive_index().
 [[nodiscard]] Result<double> u_of_assumed_air(const Air& assumed, double vacuum_wavelength_m,

@@ -1,7 +1,7 @@
 #pragma once
 /// Thermal expansion relative to the reference temperature of 20 C [ISO 1], and the correction of
-/// scales. Above 20 C the graduation of a scale is too wide: the axis has moved farther than it
-/// reads. Pure; any thread.
+/// scales. Above 20 C the graduation of a scale is too wide: the true travel of the axis is longer
+/// than its reading. Pure; any thread.
 
 namespace abbe::calib {
 
@@ -31,7 +31,7 @@ struct Expansion {
 
 struct UncertainLength {
   double value_m = 0.0;
-  double u_m = 0.0;  ///< of the thermal correction alone
+  double u_m = 0.0;  ///< standard uncertainty of the thermal correction alone
 };
 
 /// True position of an axis at the reading `reading_m`. `fixed_m` is the reading at the point where

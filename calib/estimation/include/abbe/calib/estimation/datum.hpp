@@ -28,31 +28,32 @@
 namespace abbe::calib::estimation {
 
 struct DatumSolution {
-  Eigen::VectorXd U;           ///< meets K U = 0
-  Eigen::MatrixXd covariance;  ///< Q H Q; singular
-  Eigen::MatrixXd cofactor_Q;  ///< Q above: dU/dg for g = A^T W^2 y
-  std::size_t rank = 0;        ///< of the data
+  Eigen::VectorXd U;           ///< satisfies K U = 0
+  Eigen::MatrixXd covariance;  ///< Cov(U) = Q H Q; singular
+  Eigen::MatrixXd cofactor_Q;  ///< Q above: derivative dU/dg for g = A^T W^2 y
+  std::size_t rank = 0;        ///< rank of the data without the conditions
   std::size_t datum_defect = 0;
-  /// condition number of R with columns of unit length, without singular values that count as zero
+  /// condition number of R with columns scaled to unit length; singular values that count as zero
+  /// are left out
   double condition = 0.0;
 };
 
 struct DatumOptions {
-  /// mu of each condition is this weight divided by the squared length of the condition's row of K,
-  /// whose columns are scaled as those of R to unit length
+  /// mu of each condition is this weight divided by the squared length of its row of K. The columns
+  /// of K are first scaled by the same factors that scale the columns of R to unit length.
   double weight = 1.0;
   /// Information whose R is R_n with A^T W^2 C W^2 A = R_n^T R_n (A: design, W: weights, C:
   /// covariance of the observations); null: the weights W are 1/sigma
   const Information* noise = nullptr;
-  /// Singular values of the column-scaled data below this fraction of the largest count as zero, if
-  /// it exceeds rounding (Spectrum::threshold): for data whose columns are known with less than
-  /// machine precision
+  /// Singular values of the column-scaled data that are smaller than this fraction of the largest
+  /// count as zero. Only effective if larger than the threshold for rounding (Spectrum::threshold).
+  /// For data whose columns are known with less than machine precision.
   double zero = 0.0;
-  /// name of an unknown in messages
+  /// returns the name of an unknown for messages
   std::function<std::string(std::size_t)> label;
 };
 
-/// Immutable value.
+/// Conditions of a datum; the object is immutable.
 class Datum {
  public:
   /// One row per condition, one column per unknown.
@@ -61,8 +62,7 @@ class Datum {
   [[nodiscard]] const Eigen::MatrixXd& conditions() const { return K_; }
 
   /// RankDeficient if an unknown has no observation, or if the data leave more combinations
-  /// undetermined than there are conditions; the text names unknowns that are not determined, and
-  /// no others.
+  /// undetermined than there are conditions. The text names only unknowns that are not determined.
   [[nodiscard]] Result<DatumSolution> solve(const Information&, const DatumOptions& = {}) const;
   /// The U of solve() without covariance, in less time: the rank is judged by column pivoting
   /// instead of singular values.

@@ -1,6 +1,6 @@
 #pragma once
-/// All that observations y = A U + noise state about the unknowns U, in square-root form ([Bierman
-/// 1977]): an upper triangular matrix R, a vector z and a number `rest` with
+/// The information of observations y = A U + noise about the unknowns U, in square-root form
+/// ([Bierman 1977]): an upper triangular matrix R, a vector z and a number `rest` with
 ///     |R U - z|^2 + rest = |W (A U - y)|^2   for every U,   W^T W = Cov(y)^-1
 /// The information matrix is H = R^T R. H is never formed: its condition number is the square of
 /// that of W A, so that half of the digits would be lost. Rows are added by Householder reflections
@@ -21,12 +21,12 @@ namespace abbe::calib::estimation {
 
 class Information {
  public:
-  /// Of no observations: R = 0.
+  /// Starts without observations: R = 0.
   explicit Information(std::size_t unknowns);
 
   [[nodiscard]] std::size_t unknowns() const { return unknowns_; }
-  /// Number of rows added, less the nuisances that were eliminated: rows() - rank are the degrees
-  /// of freedom.
+  /// Number of rows added minus the number of nuisances that were eliminated. rows() - rank is the
+  /// number of degrees of freedom.
   [[nodiscard]] std::size_t rows() const { return rows_; }
   [[nodiscard]] Eigen::MatrixXd R() const;
   [[nodiscard]] Eigen::VectorXd z() const;
@@ -36,14 +36,14 @@ class Information {
 
   /// Adds the rows of the batch and clears it.
   void add(RowBatch&);
-  /// Adds whitened rows.
+  /// Adds rows that are already whitened (unit variance, independent).
   void add_rows(const Eigen::MatrixXd& A, const Eigen::VectorXd& y);
   /// Whitens the rows and eliminates the nuisances of the group. BadInput for wrong sizes,
   /// DegenerateGeometry if the covariance is not positive definite.
   [[nodiscard]] Result<void> add(const ObservationGroup&);
   /// Adds the prior U_unknown ~ N(value, u^2) as one row.
   void add_prior(std::size_t unknown, double value, double u);
-  /// Adds `rows` rows without unknowns, with the sum of squares `squares` of their y.
+  /// Adds `rows` rows that contain no unknowns; `squares` is the sum of squares of their y.
   void add_rest(double squares, std::size_t rows) {
     rest_ += squares;
     rows_ += rows;
@@ -53,12 +53,12 @@ class Information {
   /// Adds independent observations of some of the unknowns. Unknown k of `part` is unknown at[k] of
   /// this object; `at` ascends.
   void add(const Information& part, std::span<const std::size_t> at);
-  /// Multiplies the information H of all observations added so far by `factor`, 0 to 1, so that
-  /// later observations have more weight.
+  /// Multiplies the information H of all observations added so far by `factor` (0 to 1), so that
+  /// observations added later have more weight.
   void forget(double factor);
 
-  /// Information about the unknowns that are not in `eliminated`, in their order, if those in
-  /// `eliminated` may have any value (marginalisation). `eliminated` must not repeat an unknown.
+  /// Information about the remaining unknowns, in their order, when the unknowns in `eliminated`
+  /// may have any value (marginalisation). `eliminated` must not repeat an unknown.
   [[nodiscard]] Information without_unknowns(std::span<const std::size_t> eliminated) const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// What `observe` of a method yields: observations that share noise and nuisances,
+/// Result of the stage `observe` of a method: observations with common noise and common nuisances,
 ///     y = A U + L c + noise,   c ~ N(0, diag u^2),   noise ~ N(0, C)
 /// U: unknowns that other groups share (parameters of the model, scale of an instrument, artefact),
 /// c: nuisances of this group alone (pose, offset, clock).

@@ -1,6 +1,6 @@
 #pragma once
-/// Rows of a linear problem that wait to be added to an Information (information.hpp). They are
-/// added in batches, because the cost of a batch depends little on its number of rows.
+/// Collects rows of a linear problem before they are added to an Information (information.hpp).
+/// Rows are added in batches, because the time for a batch depends little on its number of rows.
 
 #include <algorithm>
 #include <cstddef>

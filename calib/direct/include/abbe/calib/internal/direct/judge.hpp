@@ -18,13 +18,14 @@ void add_points(TableComparison&, const Runs&, const Eigen::VectorXd& measured,
 
 [[nodiscard]] std::size_t count_tests(const TableComparison&);
 
-/// Quantiles of one test; see compare.hpp.
+/// Quantiles for one test: Student's and normal distribution; see compare.hpp.
 struct Limits {
   double student = 0.0, normal = 0.0;
 };
 /// p: probability of a false alarm of one test; dof: 0 if the scatter of the runs is not known.
 [[nodiscard]] Limits limits_of(double p, std::size_t dof);
-/// Of a |difference| with this variance, `variance_runs` of it from the scatter of the runs.
+/// Limit of a |difference| with the variance `variance`; `variance_runs` is the part of it from the
+/// scatter of the runs.
 [[nodiscard]] double limit_of(const Limits&, double variance_runs, double variance);
 
 /// Sets the limits of the points and the finding.

@@ -9,14 +9,15 @@
 namespace abbe::calib::direct {
 
 struct Scatter {
-  double variance = 0.0;  // of one value of one run
-  std::size_t dof = 0;    // 0: not known
+  double variance = 0.0;  // of one value of one run, in m^2 or rad^2
+  std::size_t dof = 0;    // degrees of freedom; 0: the scatter is not known
 };
-/// Of a squareness: nullopt. Not known for one run, and if the values of all runs are the same.
+/// The scatter is not known (dof 0) for one run, and if all runs have the same values. For a
+/// squareness pass nullopt as motion.
 [[nodiscard]] Scatter scatter_of(const Runs&, const std::optional<ErrorMotion>&);
 
-/// Covariance of P mean() from the pooled scatter, enlarged at positions with more scatter.
-/// The offset of a run, of a straightness also its slope, is not scatter.
+/// Covariance of P mean() from the pooled scatter. It is enlarged at positions with more scatter.
+/// The offset of a run does not count as scatter; for a straightness neither does its slope.
 [[nodiscard]] Eigen::MatrixXd covariance_of_runs(const Runs&, const std::optional<ErrorMotion>&,
                                                  const Scatter&, const Eigen::MatrixXd& P);
 

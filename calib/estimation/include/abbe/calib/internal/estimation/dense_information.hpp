@@ -1,5 +1,6 @@
 #pragma once
-/// Information of dense rows that are all in memory, by one QR decomposition in blocks of columns.
+/// Computes the Information of dense rows that are all in memory, with one blocked QR
+/// decomposition.
 
 #include <Eigen/Core>
 

@@ -33,12 +33,13 @@ struct Spectrum {
 struct NullSpace {
   std::size_t rank = 0;   ///< pivoted_rank()
   Eigen::MatrixXd basis;  ///< unknowns() x datum defect, in the units of the unknowns
-  /// for each column-scaled unknown: 0 if the data determine it, 1 if they state nothing about it
+  /// for each column-scaled unknown: 0 if the data determine it, 1 if the data contain nothing
+  /// about it
   Eigen::VectorXd share;
 };
 [[nodiscard]] NullSpace null_space(const Information&);
-/// The same for a rank that is already known, at most unknowns(): the unknowns() - rank
-/// combinations that are determined worst.
+/// As null_space(), for a given rank of at most unknowns(). The basis consists of the unknowns() -
+/// rank combinations that are determined worst.
 [[nodiscard]] NullSpace null_space_of_rank(const Information&, std::size_t rank);
 
 }  // namespace abbe::calib::estimation

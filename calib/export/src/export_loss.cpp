@@ -8,11 +8,12 @@
 namespace abbe::calib {
 namespace {
 
-/// Nodes of an axis for the losses of single errors; the errors of a model are smooth enough, and
-/// its squareness and levers are linear.
+/// Number of nodes per axis for the losses of single errors. 11 are enough, because the errors of a
+/// model are smooth, and the effects of squareness and levers are linear.
 constexpr std::size_t kLossNodes = 11;
 
-/// V of the model with one error only.
+/// V at the places for a model in which only the `count` parameters from index `first` on are not
+/// zero.
 std::vector<Vector3> effects_of(const TableBasis& basis, const Eigen::VectorXd& U,
                                 std::size_t first, std::size_t count, const Vector3& tool_m,
                                 std::span<const LatticePlace> places) {

@@ -9,7 +9,8 @@
 namespace abbe::calib {
 namespace {
 
-constexpr double kDefaultSteps = 32.0;  ///< of an axis, for smooth models
+constexpr double kDefaultSteps = 32.0;  ///< number of steps of an axis for cubic tables and
+                                        ///< polynomials
 
 std::vector<double> equal_steps(double first, double last, double largest_step) {
   const double steps = std::max(1.0, std::ceil((last - first) / largest_step - 1e-9));
@@ -19,7 +20,7 @@ std::vector<double> equal_steps(double first, double last, double largest_step) 
   return nodes;
 }
 
-/// Nodes of linear tables inside the box, and its ends.
+/// The nodes of linear tables that lie inside the box, and both ends of the box.
 std::vector<double> table_nodes(std::span<const double> of_tables, double first, double last) {
   constexpr double kSame_m = 1e-9;
   std::vector<double> nodes{first};

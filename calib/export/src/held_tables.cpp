@@ -10,7 +10,8 @@
 namespace abbe::calib {
 namespace {
 
-/// The nodes if there are few enough, else as many with equal steps.
+/// For each axis its nodes if they are at most kMostFittedNodes, else kMostFittedNodes nodes with
+/// equal steps.
 GridAxes fitted_nodes(const GridAxes& nodes_m) {
   GridAxes fitted = nodes_m;
   for (auto& nodes : fitted) {
@@ -31,7 +32,7 @@ std::size_t nearest_node(std::span<const double> nodes, double q) {
                                   nodes.begin());
 }
 
-/// c at each place for a direction of travel.
+/// The correction c at each place for a direction of travel.
 Result<std::vector<Vector3>> corrections(const VolumetricModel& model, const Vector3& tool_m,
                                          std::span<const LatticePlace> places,
                                          const AxisTravel& travel) {
@@ -45,7 +46,7 @@ Result<std::vector<Vector3>> corrections(const VolumetricModel& model, const Vec
   return c_m;
 }
 
-/// Half of forward minus backward of one axis.
+/// Half of (c for forward travel - c for backward travel) of one axis, at each place.
 Result<std::vector<Vector3>> half_differences_of(const VolumetricModel& model,
                                                  const Vector3& tool_m,
                                                  std::span<const LatticePlace> places, Axis axis) {
@@ -69,7 +70,8 @@ std::vector<double> interpolated(std::span<const double> from, std::span<const d
   return out;
 }
 
-/// Adds what depends on the direction of travel of each table's own axis.
+/// Fits HeldTable::half_forward: the dependence on the direction of travel of each table's own
+/// axis.
 Result<void> add_directions(HeldTables& held, const VolumetricModel& model, const GridAxes& fitted,
                             std::span<const LatticePlace> places) {
   for (const Axis axis : kAllAxes) {
@@ -101,7 +103,8 @@ double squareness_slope(ErrorMotion motion, std::span<const double> squareness) 
   return 0.0;
 }
 
-/// A table of the model with its interpolation; 0 if the model does not have it.
+/// Value of a table of the model at q_m, with the model's interpolation; 0 if the model does not
+/// have this table.
 double model_table_at(const TableBasis& basis, std::span<const double> U, ErrorMotion motion,
                       double q_m) {
   const auto table = basis.layout().find(motion);

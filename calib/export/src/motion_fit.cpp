@@ -8,11 +8,11 @@
 namespace abbe::calib {
 namespace {
 
-/// Weight of the second differences of a table relative to its observations: a node without
-/// observations continues its neighbours in a straight line, others change by less than 1e-6 of
-/// their bend.
+/// Weight of the second differences of a table relative to its observations. At a node without
+/// observations the table continues its neighbours in a straight line. At other nodes it changes by
+/// less than 1e-6 of its second difference.
 constexpr double kSmoothness = 1e-6;
-/// Keeps the matrix regular where neither observations nor second differences reach.
+/// Keeps the matrix regular for unknowns with neither observations nor second differences.
 constexpr double kRidge = 1e-12;
 
 }  // namespace

@@ -15,24 +15,25 @@ struct LatticePlace {
   std::array<std::size_t, 3> node;
 };
 
-/// The nodes inside the validity volume; TooFewObservations without any.
+/// The nodes of the lattice inside the validity volume. TooFewObservations if there are none.
 [[nodiscard]] Result<std::vector<LatticePlace>> lattice_places(const ValidityVolume&,
                                                                const GridAxes&);
 
-/// Index of the last node at or below `q`, such that a cell follows.
+/// Index of the last node at or below `q`, but at most that of the last node but one.
 [[nodiscard]] std::size_t cell_of(std::span<const double> nodes, double q);
-/// Linear between nodes, constant beyond them.
+/// Value at `q`: linear between nodes, constant beyond the end nodes.
 [[nodiscard]] double linear_at(std::span<const double> nodes, std::span<const double> values,
                                double q);
 
 class MotionFit {
  public:
-  /// `anchors`: for each axis the node at which translations across the axis and rotations are
-  /// zero; without: no table is fixed.
+  /// `anchors`: for each axis the node at which translations across the axis and rotations are set
+  /// to zero. Without anchors no table is fixed.
   MotionFit(const KinematicChain&, const Vector3& tool_offset_m, std::span<const ErrorMotion>,
             const GridAxes&, std::span<const LatticePlace>,
             const std::optional<std::array<std::size_t, 3>>& anchors);
-  /// Values of each motion at the nodes of its axis; one target vector for each place.
+  /// Returns the values of each motion at the nodes of its axis. `targets_m`: one vector for each
+  /// place.
   [[nodiscard]] std::vector<std::vector<double>> fit(std::span<const Vector3> targets_m) const;
 
  private:
@@ -49,7 +50,8 @@ class MotionFit {
   std::vector<ErrorMotion> motions_;
   GridAxes nodes_m_;
   std::span<const LatticePlace> places_;
-  std::vector<std::vector<Eigen::Index>> unknown_;  ///< of motion and node; -1: zero
+  std::vector<std::vector<Eigen::Index>> unknown_;  ///< index of the unknown by motion and node;
+                                                    ///< -1: the value is zero
   Eigen::Index unknowns_ = 0;
   Eigen::LDLT<Eigen::MatrixXd> factor_;
 };

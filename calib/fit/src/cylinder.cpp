@@ -31,7 +31,8 @@ struct Frame {
   }
 };
 
-/// The best circle of the points in the projection along `direction`.
+/// Start of the iteration for an axis along `direction`: algebraic circle fit to the points
+/// projected along `direction`.
 Frame start(const Eigen::Matrix3Xd& p, const Vector3& direction) {
   Frame f;
   f.turn_to(direction);
@@ -55,7 +56,8 @@ Linearised<5> linearised(const Eigen::Matrix3Xd& p, const Frame& f) {
   return at;
 }
 
-/// Moves the axis, and the origin along the axis to the projection of the centroid.
+/// Applies the change to the frame, then shifts the origin along the axis to the projection of the
+/// centroid. Returns the size of the radius.
 double move(Frame& f, const Eigen::Matrix<double, 5, 1>& change) {
   const Vector3 z = f.axes.col(2) + change(1) * f.axes.col(0) - change(0) * f.axes.col(1);
   f.origin += f.axes.leftCols<2>() * change.segment<2>(2);
@@ -65,7 +67,8 @@ double move(Frame& f, const Eigen::Matrix<double, 5, 1>& change) {
   return std::abs(f.radius);
 }
 
-/// Directions all over the hemisphere (Fibonacci lattice), then the principal ones of the points.
+/// Start directions: a Fibonacci lattice on the hemisphere, then the principal directions of the
+/// points.
 std::vector<Vector3> starting_directions(const Matrix3& principal) {
   constexpr int kDirections = 24;
   std::vector<Vector3> all;
@@ -83,7 +86,8 @@ std::vector<Vector3> starting_directions(const Matrix3& principal) {
 struct FoundCylinder {
   Frame frame;
   Iteration iteration;
-  double squares = 0.0, condition = 0.0;  ///< at the end of the iteration
+  double squares = 0.0, condition = 0.0;  ///< sum of squared residuals and condition at the end of
+                                          ///< the iteration
 
   [[nodiscard]] bool is_cylinder() const {
     return iteration.converged && frame.radius > 0.0 && condition < kUndetermined;

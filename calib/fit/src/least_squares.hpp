@@ -1,6 +1,6 @@
 #pragma once
-/// Gauss-Newton for the fits of a form to points. Lengths are in units of the size of the point
-/// set, so that all unknowns are of the order of one.
+/// Gauss-Newton iteration for fits of a form to points. Lengths are in units of the size of the
+/// point set, so that all unknowns are of the order of one.
 
 #include <Eigen/Dense>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace abbe::calib::fit {
 
-/// Residuals r at the present unknowns, and their derivatives J.
+/// Residuals r for the present values of the unknowns, and their derivatives J.
 template <int Unknowns>
 struct Linearised {
   Eigen::Matrix<double, Eigen::Dynamic, Unknowns> J;
@@ -51,7 +51,7 @@ Iteration minimise(Linearise linearise, Move move) {
 template <int Unknowns>
 struct Cofactor {
   Eigen::Matrix<double, Unknowns, Unknowns> root;
-  double condition = 0.0;  ///< of J; infinite if J is not finite
+  double condition = 0.0;  ///< condition number of J; infinite if J is not finite
 };
 
 template <int Unknowns>

@@ -9,7 +9,8 @@
 namespace abbe::calib::fit {
 namespace {
 
-/// Both components across the line count as residuals, the distances are what is reported.
+/// Statistics of the distances from the line. The degrees of freedom count both components across
+/// the line as residuals.
 ResidualStatistics statistics_of_line(const Eigen::Matrix3Xd& across) {
   constexpr std::size_t kUnknownsOfLine = 4;
   const auto points = static_cast<std::size_t>(across.cols());

@@ -56,8 +56,9 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> derivatives_by_points(const Plane& plan
     centred.col(static_cast<Eigen::Index>(i)) = points[i] - plane.point;
   }
 
-  // A small rotation (a, b) of the normal about the axes e1, e2 of the plane is the regression of
-  // the displacements over the places in the plane.
+  // Displacements of the points along the normal rotate it by small angles (a, b) about the axes
+  // e1, e2 of the plane. (a, b) is the regression of the displacements on the positions in the
+  // plane.
   const Vector3 e1 = plane.normal.unitOrthogonal(), e2 = plane.normal.cross(e1);
   Eigen::Matrix<double, 2, Eigen::Dynamic> q(2, n);
   q << e1.transpose() * centred, e2.transpose() * centred;

@@ -12,10 +12,11 @@ namespace abbe::calib::fit {
 namespace {
 
 constexpr double kMostRatio = 10.0;
-constexpr std::size_t kFewestThatFit = 5;  // 9 degrees of freedom
-constexpr std::size_t kMostOff = 20;       // bounds the time
+constexpr std::size_t kFewestThatFit = 5;  // give 9 degrees of freedom
+constexpr std::size_t kMostOff = 20;       // limits the computing time
 
-constexpr double kResolution_m = 1e-9;  // below that of any instrument: rounding in a file
+constexpr double kResolution_m = 1e-9;  // below the resolution of any instrument: rounding in a
+                                        // file
 
 using Indices = std::vector<std::size_t>;
 using NormalMatrix = Eigen::Matrix<double, 6, 6>;
@@ -48,12 +49,12 @@ MotionColumns columns_at(const Vector3& lever_m) {
   return J;
 }
 
-/// The motion that fits the points with the indices `rest`, and how well it does.
+/// The rigid motion that fits the points with the indices `rest`, with its statistics.
 struct MotionOfRest {
   RigidTransform T;
   Vector3 centre_m = Vector3::Zero();
   NormalMatrix inverse_normal = NormalMatrix::Zero();
-  double u_m = 0.0;  ///< of a coordinate
+  double u_m = 0.0;  ///< standard deviation of a coordinate
 
   [[nodiscard]] double limit_m(const Vector3& wanted_m) const {
     const MotionColumns J = columns_at(wanted_m - centre_m);
@@ -83,7 +84,7 @@ std::optional<MotionOfRest> motion_of(std::span<const Vector3> measured_m,
 }
 
 /// The point of `rest` with the largest residual. If the points cannot be fitted, because one is so
-/// far away that the others coincide: the one farthest from their median.
+/// far away that the others coincide numerically: the point farthest from their median.
 std::size_t worst_of(std::span<const Vector3> measured_m, std::span<const Vector3> wanted_m,
                      const Indices& rest) {
   const auto from = selected(measured_m, rest), to = selected(wanted_m, rest);
@@ -115,7 +116,8 @@ void keep_what_fits(const MotionOfRest& motion, std::span<const Vector3> measure
                     std::span<const Vector3> wanted_m, double least_m, Indices& rest,
                     Indices& suspects) {
   const auto fits = [&](std::size_t i) {
-    // A limit that is not a number: the points do not determine the motion.
+    // A limit of NaN means that the points do not determine the motion. The point then counts as
+    // fitting.
     const double limit_m = std::max(motion.limit_m(wanted_m[i]), least_m);
     return !((motion.T * measured_m[i] - wanted_m[i]).norm() > limit_m);
   };
@@ -145,7 +147,7 @@ PointsOff points_off(std::span<const Vector3> measured_m, std::span<const Vector
     rest.erase(rest.begin() + worst);
   }
 
-  // Twice: the points that fit after all belong to the fit.
+  // The fit is repeated once with the points that were moved back to `rest`.
   for (int pass = 0; pass < 2; ++pass) {
     const auto motion = motion_of(measured_m, wanted_m, rest);
     if (!motion) {

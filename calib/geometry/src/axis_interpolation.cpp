@@ -16,9 +16,8 @@ struct TridiagonalRow {
   double sub = 0.0, diagonal = 0.0, super = 0.0;
 };
 
-/// Equations of the inner nodes, without U'' at the two end nodes: the end condition expresses it
-/// by U'' at inner nodes, whose coefficients in the first and last equation are changed
-/// accordingly.
+/// Equations of the inner nodes. U'' at the two end nodes is eliminated: the end condition
+/// expresses it by U'' at inner nodes, which changes coefficients of the first and last equation.
 std::vector<TridiagonalRow> inner_equations(std::span<const double> h_m, Interpolation kind) {
   std::vector<TridiagonalRow> rows;
   for (std::size_t i = 0; i + 1 < h_m.size(); ++i) {
@@ -56,11 +55,11 @@ void solve_tridiagonal(std::vector<TridiagonalRow> rows, Eigen::Ref<Eigen::Matri
   }
 }
 
-/// U'' at both ends.
+/// Sets the rows of M for the two end nodes (U'' at both ends).
 void set_ends(Eigen::MatrixXd& M, std::span<const double> h_m, Interpolation kind) {
   const Eigen::Index last = M.rows() - 1;
   if (kind != Interpolation::NotAKnotCubic || last < 2) {
-    return;  // zero
+    return;  // U'' is zero at both ends
   }
 
   if (last == 2) {
@@ -74,7 +73,7 @@ void set_ends(Eigen::MatrixXd& M, std::span<const double> h_m, Interpolation kin
   M.row(last) = (1.0 + end) * M.row(last - 1) - end * M.row(last - 2);
 }
 
-/// M by rows.
+/// The matrix M (axis_interpolation.hpp), stored by rows.
 std::vector<double> curvature_matrix(std::span<const double> nodes_m, Interpolation kind) {
   const auto n = static_cast<Eigen::Index>(nodes_m.size());
   std::vector<double> h_m;

@@ -7,7 +7,7 @@
 namespace abbe::calib {
 namespace {
 
-/// M of an axis; zero for linear tables.
+/// Matrix M of the interpolation of an axis (axis_interpolation.hpp); zero for linear tables.
 Eigen::MatrixXd curvature_matrix_of(const AxisInterpolation& axis) {
   const auto n = static_cast<Eigen::Index>(axis.size());
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n, n);

@@ -43,7 +43,7 @@ struct Triangle {
   std::array<Index, 3> corner{};  ///< anticlockwise seen from outside
   std::array<Index, 3> beyond{};  ///< [k]: neighbour triangle at the edge from corner k to k + 1
   WideVector normal{};            ///< outward, exact
-  double length = 0.0;            ///< of the normal
+  double length = 0.0;            ///< length of the normal
   std::vector<Index> outside{};   ///< points assigned to this triangle; they are above it
   bool removed = false;
 };
@@ -55,7 +55,7 @@ class Quickhull {
   /// Points at most `tolerance_m` above a triangle count as inside.
   Quickhull(std::span<const Vector3> points_m, double tolerance_m, ApexFrom apex_from);
 
-  /// Empty if the points are in one plane.
+  /// Points that are corners of the hull. Empty if the points are in one plane.
   [[nodiscard]] std::vector<Index> corners() const;
   [[nodiscard]] bool every_corner_protrudes() const;
   [[nodiscard]] std::vector<HalfSpace> faces() const;
@@ -210,7 +210,7 @@ bool Quickhull::start_with_four() {
   const Index d =
       extreme(all, [&](Index p) { return (is_above ? 1.0 : -1.0) * height_cells(base, p); });
   const auto [first, second] = is_above ? std::pair{b, a} : std::pair{a, b};
-  add_triangle(first, second, c);  // d is below
+  add_triangle(first, second, c);  // d is below this triangle
   add_triangle(second, first, d);
   add_triangle(c, second, d);
   add_triangle(first, c, d);

@@ -30,8 +30,8 @@ LikeTerms like_terms(const ErrorPolynomials& A) {
   return found;
 }
 
-/// +1 for equal rows, -1 for negated rows, else 0. Factors are 0, +-1 or a tool offset, copied
-/// without arithmetic: equal rows have equal bits.
+/// Returns +1 for equal rows, -1 for negated rows, else 0. Comparing bits is correct: factors are
+/// 0, +-1 or a tool offset, and are copied without arithmetic.
 double sign_between(const Eigen::RowVectorXd& a, const Eigen::RowVectorXd& b) {
   return a == b ? 1.0 : (a == -b ? -1.0 : 0.0);
 }
@@ -79,7 +79,7 @@ void normalise_sign(CombinedRow& row, std::span<const std::string> names) {
 std::vector<std::string> row_names(const std::vector<CombinedRow>& rows,
                                    std::span<const std::string> K) {
   std::vector<std::string> names(rows.size());
-  std::map<std::size_t, std::vector<std::size_t>> merged;  // component -> rows
+  std::map<std::size_t, std::vector<std::size_t>> merged;  // key: component; value: indices of rows
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if ((rows[i].w.array() != 0.0).count() > 1) {
       merged[rows[i].shares.front().component].push_back(i);

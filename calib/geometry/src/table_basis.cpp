@@ -37,7 +37,7 @@ double weighted_sum(const NodeWeights& weights, std::span<const double> node_val
   return sum;
 }
 
-/// 0.5, 0 or -0.5.
+/// The factor s / 2 of table_basis.hpp: 0.5 forward, -0.5 backward, 0 unknown.
 double half_sign(Travel travel) {
   return 0.5 * static_cast<double>(travel);
 }

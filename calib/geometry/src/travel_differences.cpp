@@ -7,7 +7,7 @@
 namespace abbe::calib {
 namespace {
 
-/// dV/dU of the model and dV/dD at a state.
+/// The derivatives dV/dU and dV/dD at a state.
 struct ColumnsOfTravel {
   Eigen::Matrix3Xd U, D;
 };

@@ -17,7 +17,7 @@ Matrix3 reversed(std::span<const Eigen::Index> axes) {
   return M;
 }
 
-/// Matrix whose product with a point has the point's coordinate from[i] as coordinate i.
+/// Permutation matrix M: coordinate i of M * p is coordinate from[i] of p.
 Matrix3 reordered(const std::array<Eigen::Index, 3>& from) {
   Matrix3 M = Matrix3::Zero();
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -41,8 +41,9 @@ double travel_m(const AxisNodes& axis) {
   return axis.nodes_m.back() - axis.nodes_m.front();
 }
 
-/// A wrong sign, order or unit moves coordinates by a large part of the travel. A coordinate a
-/// little beyond an end is a coordinate a little beyond an end.
+/// True if a point is farther outside the travel than 5 % of the shortest travel. A wrong sign,
+/// order or unit moves coordinates by such a distance; a coordinate slightly beyond an end has
+/// another cause.
 bool is_far_outside(std::span<const Vector3> points_m, const MachineNodes& travel) {
   constexpr double kFar = 0.05;
   double shortest_m = travel_m(travel[0]);
@@ -52,8 +53,9 @@ bool is_far_outside(std::span<const Vector3> points_m, const MachineNodes& trave
   return !outside_travel(points_m, travel, kFar * shortest_m).empty();
 }
 
-/// True if the scaled points extend over at least half of the travel of an axis. A factor below 1
-/// makes all coordinates small, and small coordinates are inside the travel of most machines.
+/// True if the scaled points extend over at least half of the travel of an axis. Without this
+/// condition every factor below 1 would look right: small coordinates are inside the travel of most
+/// machines.
 bool fills(std::span<const Vector3> points_m, double factor, const MachineNodes& travel) {
   constexpr double kPart = 0.5;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -69,8 +71,9 @@ bool fills(std::span<const Vector3> points_m, double factor, const MachineNodes&
   return false;
 }
 
-/// Units of the points that may be wrong, and those of the travel. Points in um and a travel in m
-/// differ by the same factor; the size of the travel decides.
+/// Units that may be wrong: those of the points, and those of the travel. Points in um instead of
+/// mm and a travel in m instead of mm have the same factor; the size of the travel decides which is
+/// named.
 std::vector<UnitMistake> units_of_points_or_travel(const MachineNodes& travel) {
   constexpr double kShortest_m = 20e-3, kMicrometre = 1e-3;
   std::vector<UnitMistake> all = unit_mistakes();

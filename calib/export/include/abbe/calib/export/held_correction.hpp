@@ -1,7 +1,7 @@
 #pragma once
-/// What the compensation of a control can hold of the correction c of a model. c solves
+/// The part of a model's correction c that the compensation of a control can hold. c solves
 ///     c = -V(p + c),   p: commanded position, V = actual - nominal
-/// A control of tables adds, at p and in one step,
+/// A control with tables does not iterate. At p it adds
 ///     c_held(p) = sum_k effect_k(p) T_k(p_a)
 /// T_k: table of one error motion of axis a, linear between nodes; effect_k: a unit vector for a
 /// translation, its cross product with the lever for a rotation (rigid_body_model.hpp). The tables
@@ -23,14 +23,15 @@ struct ExportBox {
   Vector3 min_m = Vector3::Zero(), max_m = Vector3::Zero();
 };
 
-/// The box around the validity hull. BadInput if `part` is given and is empty or reaches more than
-/// ValidityVolume::kTolerance_m beyond this box: a model is not extrapolated into a control.
+/// Returns `part`, or the box around the validity hull if `part` is not given. BadInput if `part`
+/// is given and is empty or reaches more than ValidityVolume::kTolerance_m beyond this box: a model
+/// is not extrapolated into a control.
 [[nodiscard]] Result<ExportBox> export_box(const VolumetricModel&,
                                            const std::optional<ExportBox>& part = {});
 
 struct NodeOptions {
-  std::optional<double> step_m{};  ///< largest distance of nodes; not given: see export_nodes()
-  bool equidistant = false;        ///< the format has a constant step
+  std::optional<double> step_m{};  ///< largest distance of nodes; if not given: see export_nodes()
+  bool equidistant = false;        ///< true if the format of the control has a constant step
 };
 
 /// Nodes of each axis, from one end of the box to the other.
@@ -45,11 +46,12 @@ inline constexpr std::size_t kMostExportNodes = 5000;
 
 struct HeldTable {
   ErrorMotion motion;
-  std::vector<double> value;         ///< m or rad at the nodes; mean of both directions
-  std::vector<double> half_forward;  ///< forward minus mean; empty: no difference
+  std::vector<double> value;         ///< m or rad at the nodes; mean of both directions of travel
+  std::vector<double> half_forward;  ///< value for forward travel minus `value`; empty: no
+                                     ///< difference
 };
 
-/// The tables of a control. A position beyond the nodes has the value of the last node.
+/// The tables of a control. A position beyond the end nodes has the value of the nearest end node.
 struct HeldTables {
   KinematicChain chain;
   Vector3 tool_offset_m = Vector3::Zero();
@@ -62,70 +64,78 @@ struct HeldTables {
 struct HeldGrid {
   GridAxes axes_m;
   std::vector<Vector3> c_node_m;
-  std::vector<bool> inside;  ///< the node is in the validity volume
+  std::vector<bool> inside;  ///< true if the node is in the validity volume
   [[nodiscard]] Vector3 c_m(const Vector3& commanded_m) const;
 };
 
-/// The tables with these motions that differ least from c, in the least-squares sense over the
-/// nodes inside the validity volume. A fit uses at most kMostFittedNodes nodes per axis; tables
-/// with more nodes are interpolated between these. `per_direction`: also the difference between the
-/// directions of travel of the table's own axis. Translations across the axis and rotations are
-/// zero at the node nearest to the reference of the axis: their constant is in the tables of the
-/// other axes. TooFewObservations without a node inside the validity volume; errors as
+/// Fits tables of the given motions so that their correction differs least from c, in the
+/// least-squares sense over the nodes inside the validity volume. A fit uses at most
+/// kMostFittedNodes nodes per axis; tables with more nodes are interpolated between these.
+/// `per_direction`: also fit the difference between the directions of travel of the table's own
+/// axis. Translations across the axis and rotations are zero at the node nearest to the reference
+/// of the axis, because the tables of the other axes contain their constant part.
+/// TooFewObservations without a node inside the validity volume; errors as
 /// VolumetricModel::command_correction().
 inline constexpr std::size_t kMostFittedNodes = 64;
 [[nodiscard]] Result<HeldTables> fit_tables(const VolumetricModel&, const Vector3& tool_offset_m,
                                             std::span<const ErrorMotion>, const GridAxes& nodes_m,
                                             bool per_direction);
 
-/// The tables of the model itself, with opposite sign. Squareness is contained in the straightness
-/// tables EXY, EXZ and EYZ, where it is a slope; then all controls read it alike. A model of
-/// polynomials has no tables: fit_tables() with the motions that one tool shows. The difference
-/// between -V(p), which a control computes from these tables, and c is of second order.
+/// The tables of the model itself, with opposite sign. Squareness is contained as a slope in the
+/// straightness tables EXY, EXZ and EYZ, because controls define squareness in different ways. A
+/// model of polynomials has no tables: fit_tables() is called with the motions that one tool
+/// determines. The difference between -V(p), which a control computes from these tables, and c is
+/// of second order.
 [[nodiscard]] Result<HeldTables> tables_of_model(const VolumetricModel&,
                                                  const Vector3& tool_offset_m,
                                                  const GridAxes& nodes_m);
 
-/// c at the nodes, for one direction of travel.
+/// Corrections c at the nodes of a grid, for one direction of travel.
 [[nodiscard]] Result<HeldGrid> grid_of_model(const VolumetricModel&, const Vector3& tool_offset_m,
                                              const GridAxes& nodes_m, const AxisTravel&);
 
-/// EXX EYY EZZ; these and the six straightness errors.
+/// positioning_motions(): EXX EYY EZZ. translation_motions(): these and the six straightness
+/// errors.
 [[nodiscard]] std::vector<ErrorMotion> positioning_motions();
 [[nodiscard]] std::vector<ErrorMotion> translation_motions();
 
-/// A place of the volume at which a file is compared with the model.
+/// A commanded position and direction of travel at which an exported file is compared with the
+/// model.
 struct ExportPlace {
   Vector3 commanded_m = Vector3::Zero();
   AxisTravel travel{};  ///< forward or backward for each axis
 };
-/// Uniformly distributed in the box and inside the validity volume; the same for the same seed.
-/// DegenerateGeometry if less than 1 of 1000 places of the box is inside.
+/// Returns places that are uniformly distributed in the box and inside the validity volume. The
+/// same seed gives the same places. DegenerateGeometry if less than 1 of 1000 places of the box is
+/// inside.
 [[nodiscard]] Result<std::vector<ExportPlace>> random_places(const VolumetricModel&,
                                                              const ExportBox&, std::size_t count,
                                                              std::uint32_t seed);
 
 using CorrectionFunction = std::function<Vector3(const ExportPlace&)>;
 
-/// Components x, y, z at the places.
+/// Statistics over the places, separately for x, y and z.
 struct ExportLoss {
-  Vector3 rms_without_m = Vector3::Zero(), max_without_m = Vector3::Zero();  ///< of c
-  Vector3 rms_lost_m = Vector3::Zero(), max_lost_m = Vector3::Zero();        ///< of c - c_held
+  /// of c: error without correction
+  Vector3 rms_without_m = Vector3::Zero(), max_without_m = Vector3::Zero();
+  /// of c - c_held: part that is lost
+  Vector3 rms_lost_m = Vector3::Zero(), max_lost_m = Vector3::Zero();
 };
-/// `travel`: if not given, that of each place.
+/// Compares `held` with c at the places. If `travel` is not given, the direction of each place is
+/// used.
 [[nodiscard]] Result<ExportLoss> export_loss(const VolumetricModel&, const Vector3& tool_offset_m,
                                              std::span<const ExportPlace>,
                                              const std::optional<AxisTravel>& travel,
                                              const CorrectionFunction& held);
 
-/// Effect of one error of the model on V in the volume, and what tables with given motions cannot
-/// hold of it.
+/// Effect of one error of the model on V in the volume, and the part of it that tables of the given
+/// motions cannot hold.
 struct ErrorLoss {
   std::string name;  ///< "EAX", "EC0Y"
   double rms_m = 0.0, rms_lost_m = 0.0, max_lost_m = 0.0;
 };
-/// Errors without effect are left out. Empty for a model of polynomials: it does not separate the
-/// errors. What linear interpolation between nodes loses is not contained.
+/// Returns one entry for each error that has an effect. Empty for a model of polynomials, because
+/// it does not separate the errors. The loss by linear interpolation between nodes is not included.
 [[nodiscard]] Result<std::vector<ErrorLoss>> losses_by_error(const VolumetricModel&,
                                                              const Vector3& tool_offset_m,
                                                              std::span<const ErrorMotion>,

@@ -19,22 +19,22 @@ struct Cylinder {
   Vector3 point = Vector3::Zero();  ///< projection of the centroid of the points on the axis
   Vector3 direction = Vector3::UnitZ();
   double radius = 0.0;
-  /// of point x y z, direction x y z and radius: rank 5; zero for 5 points. For the point it is
-  /// that of the axis there: displacements along the axis do not count. For the direction it is
-  /// zero along the axis.
+  /// covariance of point x y z, direction x y z and radius: rank 5; zero for 5 points. The part of
+  /// the point contains no displacement along the axis; the part of the direction is zero along the
+  /// axis
   Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
-  ResidualStatistics residuals;  ///< negative: point inside
+  ResidualStatistics residuals;  ///< negative residual: point inside
   /// condition number of the Jacobian with lengths in units of the size of the points
   double condition = 0.0;
   int iterations = 0;
 };
 
-/// `near`: approximate direction of the axis; the scalar product with the result is positive. The
-/// nominal direction is the right choice: from 70 degrees off, one fit in five finds the best
-/// cylinder. Without it the fit begins with directions all over the hemisphere and takes the
-/// cylinder with the smallest residuals; the largest component of its direction is positive.
-/// NotFinite; TooFewObservations below 5 different points; DegenerateGeometry if they lie on a
-/// line, in a plane, or so that rounding decides the result (for example two points in each
+/// `near`: approximate direction of the axis, preferably the nominal one; the scalar product with
+/// the result is positive. A fit from a direction that is 70 degrees off finds the best cylinder in
+/// one of five cases. Without `near` the fit starts with many directions of the hemisphere and
+/// takes the cylinder with the smallest residuals; the largest component of its direction is
+/// positive. NotFinite; TooFewObservations below 5 different points; DegenerateGeometry if they lie
+/// on a line, in a plane, or so that rounding decides the result (for example two points in each
 /// section); NotConverged if no iteration converges. `known_sigma`: standard deviation of a point
 /// along the normal, used for the covariance instead of that of the residuals.
 [[nodiscard]] Result<Cylinder> fit_cylinder(std::span<const Vector3> points,

@@ -14,7 +14,7 @@ namespace abbe::calib::fit {
 struct Sphere {
   Vector3 centre = Vector3::Zero();
   double radius = 0.0;
-  /// of centre x y z and radius; zero for 4 points
+  /// covariance of centre x y z and radius; zero for 4 points
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   ResidualStatistics residuals;
   /// condition number of the Jacobian with lengths in units of the radius; large if the points

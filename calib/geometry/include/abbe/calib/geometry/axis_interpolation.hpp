@@ -27,7 +27,7 @@
 namespace abbe::calib {
 
 enum class Interpolation { Linear, NaturalCubic, NotAKnotCubic };
-/// "linear", "cubic" (natural), "not-a-knot-cubic".
+/// Returns "linear", "cubic" (natural) or "not-a-knot-cubic".
 [[nodiscard]] std::string_view name(Interpolation);
 /// The interpolation of the tables of a model by its name(); nullopt for any other text.
 [[nodiscard]] std::optional<Interpolation> table_interpolation(std::string_view name);
@@ -44,9 +44,10 @@ class NodeWeights {
     return below_ == nullptr ? near : near + curve_a_ * below_[i] + curve_b_ * above_[i];
   }
 
-  /// The same as a sum of four terms of the cell [k, k + 1]:
+  /// The interpolation as a sum of four terms of the cell [k, k + 1], with the symbols of this
+  /// header:
   ///     f = value[0] U_k + value[1] U_k+1 + curvature[0] U''_k + curvature[1] U''_k+1
-  /// Linear: curvature is zero.
+  /// For linear interpolation `curvature` is zero.
   struct OfCell {
     std::size_t k = 0;
     double value[2] = {1.0, 0.0};
@@ -61,14 +62,14 @@ class NodeWeights {
   const double *below_ = nullptr, *above_ = nullptr;  ///< rows k and k + 1 of M; null: linear
 };
 
-/// Immutable value.
+/// The interpolation of one axis: its nodes and, for a cubic, its matrix M. Immutable.
 class AxisInterpolation {
  public:
   /// Largest number of nodes of a cubic. Its matrix M is dense: 500 x 500 numbers take 2 MB.
   static constexpr std::size_t kMostCubicNodes = 500;
 
-  /// BadInput or NotFinite for nodes that check_nodes() refuses, BadInput for a cubic with more
-  /// than kMostCubicNodes nodes.
+  /// Returns BadInput or NotFinite for nodes that check_nodes() refuses, BadInput for a cubic with
+  /// more than kMostCubicNodes nodes.
   [[nodiscard]] static Result<AxisInterpolation> of(std::span<const double> nodes_m, Interpolation);
 
   [[nodiscard]] Interpolation kind() const { return kind_; }
@@ -78,14 +79,14 @@ class AxisInterpolation {
     return kind_ == Interpolation::Linear ? 2 : size();
   }
 
-  /// Row of M for a node: U'' there is the product of this row and U. Empty for linear
+  /// Row of M for a node: the product of this row and U is U'' at the node. Empty for linear
   /// interpolation, whose U'' is zero.
   [[nodiscard]] std::span<const double> curvature_row(std::size_t node) const {
     return curvature_.empty() ? std::span<const double>{}
                               : std::span(curvature_).subspan(node * size(), size());
   }
 
-  /// No allocation.
+  /// Weights of the nodes at a position. Does not allocate.
   [[nodiscard]] NodeWeights at(double position_m) const;
 
  private:

@@ -28,11 +28,11 @@ struct PolynomialShare {
   double factor = 1.0;
 };
 
-/// Immutable value; for one tool offset.
+/// The equivalent model for one kinematic chain, order and tool offset. Immutable.
 class EquivalentModel {
  public:
-  /// BadInput for an order out of range. The offset changes W, but not the names, the rank or the
-  /// span of X.
+  /// Returns BadInput for an order outside kLeastOrder to kMostOrder. The tool offset changes W,
+  /// but not the names, the rank or the space that the columns of X span.
   [[nodiscard]] static Result<EquivalentModel> of(const KinematicChain&, int order,
                                                   const Vector3& tool_offset_mm = Vector3::Zero());
 

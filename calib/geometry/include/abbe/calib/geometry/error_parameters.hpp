@@ -39,7 +39,7 @@ struct ErrorMotion {
 [[nodiscard]] std::optional<ErrorMotion> error_motion(std::string_view iso_name);
 /// EXX, EYY, EZZ.
 [[nodiscard]] bool is_positioning(ErrorMotion e);
-/// The other six translations.
+/// The six translations that are not positioning errors.
 [[nodiscard]] bool is_straightness(ErrorMotion e);
 
 /// Squareness errors in the order in which every parameter vector contains them.

@@ -27,7 +27,7 @@ namespace abbe::calib {
 inline constexpr int kLeastOrder = 1;
 inline constexpr int kMostOrder = 5;
 
-/// x^i y^j z^k.
+/// The monomial x^i y^j z^k, exponents (i, j, k).
 struct Monomial {
   std::array<int, 3> exponent{};
   [[nodiscard]] double at(const Vector3& p_mm) const;
@@ -37,7 +37,7 @@ struct Monomial {
                           const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
 };
 
-/// A(component, coefficient) contains factor * monomial.
+/// One term of A: the entry (component, coefficient) contains factor * monomial.
 struct PolynomialTerm {
   std::size_t component = 0;
   std::size_t coefficient = 0;
@@ -45,10 +45,10 @@ struct PolynomialTerm {
   double factor = 1.0;
 };
 
-/// Immutable value: A in symbolic form.
+/// The matrix A in symbolic form. Immutable.
 class ErrorPolynomials {
  public:
-  /// BadInput unless kLeastOrder <= order <= kMostOrder.
+  /// Returns BadInput unless kLeastOrder <= order <= kMostOrder.
   [[nodiscard]] static Result<ErrorPolynomials> of(const KinematicChain&, int order,
                                                    const Vector3& tool_offset_mm = Vector3::Zero());
 
@@ -57,7 +57,7 @@ class ErrorPolynomials {
   /// Then squareness: `S_zx`.
   [[nodiscard]] std::span<const std::string> names() const { return names_; }
   [[nodiscard]] std::span<const PolynomialTerm> terms() const { return terms_; }
-  /// 3 x names().size()
+  /// The matrix A (3 x names().size()) at the reading p.
   [[nodiscard]] Eigen::Matrix3Xd A(const Vector3& p_mm) const;
 
  private:

@@ -11,7 +11,7 @@
 
 namespace abbe::calib {
 
-// Interpolation of tables in configurations, files and messages.
+// Names of the interpolations of tables in configurations, files and messages.
 inline constexpr std::string_view kLinearBasis = "linear";
 inline constexpr std::string_view kCubicBasis = "cubic";  ///< natural cubic
 inline constexpr std::string_view kNotAKnotCubicBasis = "not-a-knot-cubic";

@@ -10,13 +10,13 @@ namespace abbe::calib {
 
 struct MachineTouch {
   std::vector<Vector3> way_m;         ///< corner points of the path to the touch
-  Vector3 at_m = Vector3::Zero();     ///< in contact
-  Vector3 normal = Vector3::UnitZ();  ///< of the surface, to the tip
+  Vector3 at_m = Vector3::Zero();     ///< centre of the tip in contact
+  Vector3 normal = Vector3::UnitZ();  ///< normal of the surface, towards the tip
 };
 
 struct MachineTouches {
   std::vector<MachineTouch> touches;
-  std::vector<Vector3> leave_m;  ///< after the last touch: off the surface, then up
+  std::vector<Vector3> leave_m;  ///< path after the last touch: off the surface, then up
 };
 
 }  // namespace abbe::calib

@@ -1,5 +1,4 @@
 #pragma once
-/// The non-zero columns of a model at one state of the machine.
 
 #include <cstddef>
 #include <span>
@@ -15,14 +14,15 @@ struct Column {
   Vector3 dV_dU = Vector3::Zero();
 };
 
-/// A sparse 3 x n matrix in memory of the caller, so that it can be filled again and again without
-/// allocation. Parameters ascend.
+/// The non-zero columns of a model at one state of the machine: a sparse 3 x n matrix. It is stored
+/// in memory of the caller, so that it can be filled repeatedly without allocation. Parameters are
+/// in ascending order.
 class ModelColumns {
  public:
   explicit ModelColumns(std::span<Column> memory) : memory_(memory) {}
 
   void clear() { count_ = 0; }
-  /// The memory must have space for it.
+  /// Appends a column. The memory must have space for it.
   void push(std::size_t parameter, const Vector3& dV_dU) { memory_[count_++] = {parameter, dV_dU}; }
 
   [[nodiscard]] std::size_t size() const { return count_; }

@@ -22,7 +22,7 @@ struct Table {
   std::size_t offset = 0;  ///< index in U of the table's first node
 };
 
-/// Immutable value.
+/// Tables, nodes and squareness of a model, and the index of each parameter in U. Immutable.
 class ParameterLayout {
  public:
   /// The 14 tables that are estimable with one constant target offset. The rotations of the axis

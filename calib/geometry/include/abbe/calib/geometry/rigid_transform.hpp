@@ -15,7 +15,7 @@ using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix3d;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-/// p_to = R * p_from + t_m. Name a value T_to_from (`T_machine_tracker`).
+/// Rigid motion p_to = R * p_from + t_m. The name of a variable is T_to_from (`T_machine_tracker`).
 struct RigidTransform {
   Matrix3 R = Matrix3::Identity();
   Vector3 t_m = Vector3::Zero();

@@ -26,9 +26,10 @@ struct ReadingBox {
 
 enum class FunctionKind { Constant, Translation, Rotation };
 
-/// A vector function: the sum of parts, each in one component of V,
+/// A vector function of the readings: the sum of its parts. Each part is in one component of V,
 ///     sign * P_order(u_axis)   or   sign * P_order(u_axis) * arm,
-/// P_order: Legendre polynomial, u_axis: scaled reading of the axis, arm: that of another axis.
+/// P_order: Legendre polynomial, u_axis: scaled reading of the axis, arm: scaled reading of another
+/// axis in units of arm_unit_m().
 struct DesignFunction {
   struct Part {
     std::size_t component = 0;
@@ -42,16 +43,17 @@ struct DesignFunction {
   std::size_t parts = 1;
 };
 
-/// Immutable value.
+/// The functions of the scaled design for one kinematic chain, order and box. Immutable.
 class ScaledDesign {
  public:
-  /// Values of all Legendre polynomials and arms at one reading. No allocation.
+  /// Values of all Legendre polynomials and arms at one reading.
   struct Factors {
     std::array<std::array<double, kMostOrder + 1>, 3> P;
-    std::array<double, 4> arm;  ///< the last is 1: no arm
+    std::array<double, 4> arm;  ///< of X, Y, Z; the last is 1: no arm
   };
 
-  /// DegenerateGeometry if the box has no extent in an axis, BadInput for an order out of range.
+  /// Returns DegenerateGeometry if the box has no extent in an axis, BadInput for an order outside
+  /// kLeastOrder to kMostOrder.
   [[nodiscard]] static Result<ScaledDesign> of(const KinematicChain&, int order, const ReadingBox&);
 
   [[nodiscard]] const EquivalentModel& equivalent() const { return equivalent_; }
@@ -59,8 +61,9 @@ class ScaledDesign {
   /// Unit of the arms: the largest half width.
   [[nodiscard]] double arm_unit_m() const { return box_.half_width_m.maxCoeff(); }
   [[nodiscard]] std::size_t size() const { return functions_.size(); }
-  /// In the order of equivalent().names(): function j contributes to the named coefficient j and,
-  /// because a Legendre polynomial contains lower powers, to other named coefficients.
+  /// The functions in the order of equivalent().names(). Function j contributes to the named
+  /// coefficient j and, because a Legendre polynomial contains lower powers, to other named
+  /// coefficients.
   [[nodiscard]] std::span<const DesignFunction> functions() const { return functions_; }
 
   [[nodiscard]] Factors factors(const Vector3& reading_m) const;
@@ -68,12 +71,12 @@ class ScaledDesign {
                                     const Factors& at) {
     return part.sign * at.P[f.axis][static_cast<std::size_t>(f.order)] * at.arm[part.arm];
   }
-  /// 3 x size(): E_m = B c_m.
+  /// Matrix B (3 x size()) at a reading: E_m = B c_m, c_m: coefficients in m.
   [[nodiscard]] Eigen::Matrix3Xd B(const Vector3& reading_m) const;
-  /// Matrix M from the coefficients c_m of this design to those of the equivalent model, beta =
-  /// M (1000 c_m), whose units are mm^(1-k) and rad mm^-k for order k.
+  /// Matrix M that converts the coefficients c_m of this design to those of the equivalent model:
+  /// beta = M (1000 c_m). The units of beta are mm^(1-k) and rad mm^-k for order k.
   [[nodiscard]] Eigen::MatrixXd named_from_scaled() const;
-  /// size() x 3: maps a small rotation vector omega to the coefficients c of the field
+  /// Matrix (size() x 3) that maps a small rotation vector omega to the coefficients c of the field
   /// V(q) = omega x (q - about).
   [[nodiscard]] Eigen::MatrixX3d rotation_about(const Vector3& about_m) const;
 

@@ -23,19 +23,19 @@ namespace abbe::calib {
 enum class TravelDependence { None, Backlash, Tables };
 
 struct TableOptions {
-  std::array<Interpolation, 3> interpolation{};  ///< of the tables of X, Y, Z
+  std::array<Interpolation, 3> interpolation{};  ///< interpolation of the tables of X, Y, Z
   TravelDependence travel = TravelDependence::None;
 
-  /// The same interpolation for all axes, no dependence on travel.
+  /// Options with the same interpolation for all axes and no dependence on the direction of travel.
   [[nodiscard]] static TableOptions all_axes(Interpolation kind) {
     return {.interpolation = {kind, kind, kind}};
   }
 };
 
-/// Immutable value.
+/// A model of tables as columns: which nodes of which tables contribute to V at a state. Immutable.
 class TableBasis {
  public:
-  /// BadInput if a cubic table has too many nodes (AxisInterpolation::kMostCubicNodes).
+  /// Returns BadInput if a cubic table has too many nodes (AxisInterpolation::kMostCubicNodes).
   [[nodiscard]] static Result<TableBasis> of(ParameterLayout, const TableOptions& = {});
 
   [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
@@ -46,12 +46,13 @@ class TableBasis {
     return {{axis_[0].kind(), axis_[1].kind(), axis_[2].kind()}, travel_};
   }
   [[nodiscard]] std::size_t size() const { return size_; }
-  /// Largest number of columns at one state.
+  /// Largest number of columns that append_columns() can add at one state.
   [[nodiscard]] std::size_t most_columns() const { return most_columns_; }
 
-  /// Appends the columns. No allocation; needs space for most_columns().
+  /// Appends the columns M B at this state. Does not allocate; `columns` needs space for
+  /// most_columns().
   void append_columns(const MachineState&, ModelColumns&) const;
-  /// V = M B U. No allocation.
+  /// V = M B U at this state. Does not allocate.
   [[nodiscard]] Vector3 V_m(const MachineState&, std::span<const double> U) const;
 
   /// Name of a parameter for messages: "EXX at -0.300 m", "EC0Y", "backlash of EXX", "travel

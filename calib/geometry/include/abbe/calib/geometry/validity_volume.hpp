@@ -12,11 +12,12 @@ namespace abbe::calib {
 
 struct HalfSpace {
   Vector3 outward;  ///< unit length
-  double offset_m;  ///< p is inside if outward . p <= offset_m
+  double offset_m;  ///< a point p is inside if outward . p <= offset_m
 };
 
-/// Immutable value; a query is cheap. The vertices alone determine the volume: a volume that is
-/// stored as its vertices and read again is identical.
+/// The convex hull as half spaces and vertices; a query takes little time. The vertices alone
+/// determine the volume: a volume that is stored as its vertices and read again is identical.
+/// Immutable.
 class ValidityVolume {
  public:
   /// Tolerance of contains(): an axis at the end of its travel can read slightly more than the
@@ -34,7 +35,7 @@ class ValidityVolume {
   [[nodiscard]] static Result<ValidityVolume> of_vertices(std::span<const Vector3> vertices_m);
 
   [[nodiscard]] bool contains(const Vector3& axis_position_m) const;
-  /// Sorted by x, then y, then z, ascending.
+  /// Vertices in ascending order of x, then y, then z.
   [[nodiscard]] std::span<const Vector3> vertices_m() const { return vertices_m_; }
 
  private:

@@ -14,7 +14,7 @@ namespace abbe::calib::fit {
 struct Circle {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double radius = 0.0;
-  Matrix3 covariance = Matrix3::Zero();  ///< of centre x y and radius; zero for 3 points
+  Matrix3 covariance = Matrix3::Zero();  ///< covariance of centre x y and radius; zero for 3 points
   ResidualStatistics residuals;
   /// condition number of the Jacobian with lengths in units of the size of the points; large if
   /// the points cover only a flat arc

@@ -14,10 +14,12 @@ namespace abbe::calib::fit {
 struct Line {
   Vector3 point = Vector3::Zero();  ///< centroid
   Vector3 direction = Vector3::UnitX();
-  /// of `point` across the line and of `direction`: rank 2, zero along the line; zero for 2 points
+  /// covariance of `point` across the line and of `direction`: rank 2, zero along the line; all
+  /// zero for 2 points
   Matrix3 cov_point = Matrix3::Zero();
   Matrix3 cov_direction = Matrix3::Zero();
-  /// Distances of the points from the line, not negative; 2 n - 4 degrees of freedom.
+  /// Statistics of the distances of the points from the line, which are not negative; 2 n - 4
+  /// degrees of freedom.
   ResidualStatistics residuals;
 };
 

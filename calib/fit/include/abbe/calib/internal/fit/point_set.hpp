@@ -13,7 +13,7 @@ namespace abbe::calib::fit {
 struct PointSet {
   Vector3 centroid = Vector3::Zero();
   Eigen::Matrix3Xd centred;  ///< one column per point, relative to the centroid
-  /// principal directions, columns, longest extent first
+  /// principal directions of the points as columns, that of the longest extent first
   Matrix3 directions = Matrix3::Identity();
   Vector3 singular_values = Vector3::Zero();  ///< descending
   double size = 0.0;                          ///< largest distance from the centroid
@@ -29,8 +29,8 @@ struct PointSet {
   }
 };
 
-/// NotFinite; TooFewObservations with fewer than `needed` different points. `what`, the name of the
-/// fit, begins the error text.
+/// Computes the PointSet. NotFinite; TooFewObservations with fewer than `needed` different points.
+/// The error text begins with `what`, the name of the fit.
 [[nodiscard]] Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed,
                                          const char* what);
 

@@ -1,5 +1,4 @@
 #pragma once
-/// Errors of the length of the scales in a model with tables.
 
 #include <Eigen/Dense>
 
@@ -7,8 +6,9 @@
 
 namespace abbe::calib {
 
-/// Effect of a relative change of the scale of each axis on the parameters: the positioning table
-/// has slope 1 and is zero at the reference. One column each for X, Y, Z.
+/// Effect of a relative change of the scale (length error) of each axis on the parameters of a
+/// model with tables: the positioning table has slope 1 and is zero at the reference. One column
+/// each for X, Y, Z.
 [[nodiscard]] Eigen::MatrixX3d axis_scale_columns(const ParameterLayout&);
 
 }  // namespace abbe::calib

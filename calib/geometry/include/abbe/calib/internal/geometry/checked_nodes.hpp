@@ -1,14 +1,14 @@
 #pragma once
-/// Positions at which a model of cubic tables is checked.
 
 #include "abbe/calib/geometry/axis_table.hpp"
 
 namespace abbe::calib {
 
-/// The nodes, and the middle of each cell: a cubic has its largest values and slopes between nodes
-/// also. Where this makes a grid of more than kMostChecked positions, the nodes alone.
+/// Positions at which a model of cubic tables is checked: the nodes and the middle of each cell,
+/// because a cubic can have its largest values and slopes between nodes. If this makes a grid of
+/// more than kMostChecked positions, the nodes alone.
 [[nodiscard]] inline MachineNodes checked_nodes_of_cubic(const MachineNodes& nodes) {
-  constexpr double kMostChecked = 3e5;  // V takes 0.5 us at each
+  constexpr double kMostChecked = 3e5;  // V takes 0.5 us at each position
   MachineNodes with_middles = nodes;
   double positions = 1.0;
   for (AxisNodes& axis : with_middles) {

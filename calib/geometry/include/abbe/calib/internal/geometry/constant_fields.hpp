@@ -1,5 +1,4 @@
 #pragma once
-/// Fields V that are constant in space, in terms of the scaled design (scaled_design.hpp).
 
 #include <Eigen/Core>
 
@@ -7,7 +6,8 @@
 
 namespace abbe::calib {
 
-/// design.size() x 3: maps a vector v [m] to the coefficients c of the field V(q) = v.
+/// Matrix (design.size() x 3) that maps a vector v [m] to the coefficients c of the scaled design
+/// (scaled_design.hpp) for the field V(q) = v, which is constant in space.
 inline Eigen::MatrixX3d constant_fields(const ScaledDesign& design) {
   Eigen::MatrixX3d C = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(design.size()), 3);
   for (std::size_t j = 0; j < design.size(); ++j) {

@@ -4,16 +4,17 @@
 
 namespace abbe::calib {
 
-/// What is added to V and its covariance of the mean of both directions.
+/// Terms added to the V and covariance of a model that is the mean of both directions of travel.
 struct TravelEffect {
   Vector3 V_m = Vector3::Zero();
   Matrix3 cov_m2 = Matrix3::Zero();
 };
 
-/// For the direction of travel in the state. The covariance of the mean contains h h^T of each
-/// axis, h: effect of half its differences.
-/// - Direction known: V changes by s h, and the covariance of U and D replaces h h^T.
-/// - Unknown: V is the mean of two values. Its variance is E(h h^T) = h h^T + Cov(h).
+/// Computes the terms for the direction of travel in the state. The covariance of the mean contains
+/// h h^T for each axis, h: effect on V of half the differences D of this axis.
+/// - Direction known: V changes by s h (s = 1 forward, -1 backward). The covariance that follows
+/// from U and D replaces h h^T.
+/// - Direction unknown: V stays the mean of two values. Its variance is E(h h^T) = h h^T + Cov(h).
 [[nodiscard]] TravelEffect effect_of_travel(const TableBasis& basis, const TravelDifferences&,
                                             const MachineState&);
 

@@ -12,7 +12,7 @@
 
 namespace abbe::calib {
 
-/// Immutable value.
+/// Holds one form of a model: tables or polynomials. Immutable.
 class ModelBasis {
  public:
   using Form = std::variant<TableBasis, PolynomialBasis>;
@@ -21,12 +21,13 @@ class ModelBasis {
   [[nodiscard]] std::size_t size() const {
     return std::visit([](const auto& form) { return form.size(); }, form_);
   }
-  /// Largest number of columns at one state.
+  /// Largest number of columns that columns() can return at one state.
   [[nodiscard]] std::size_t most_columns() const {
     return std::visit([](const auto& form) { return form.most_columns(); }, form_);
   }
 
-  /// Replaces the columns by those at this state. No allocation; needs space for most_columns().
+  /// Replaces the content of `columns` by the columns of B at this state. Does not allocate;
+  /// `columns` needs space for most_columns().
   void columns(const MachineState& state, ModelColumns& columns) const {
     columns.clear();
     std::visit([&](const auto& form) { form.append_columns(state, columns); }, form_);
@@ -41,7 +42,7 @@ class ModelBasis {
     return std::visit([&](const auto& form) { return form.label(parameter); }, form_);
   }
 
-  /// Null for another form.
+  /// The tables, or null if the model has another form.
   [[nodiscard]] const TableBasis* tables() const { return std::get_if<TableBasis>(&form_); }
   [[nodiscard]] const PolynomialBasis* polynomials() const {
     return std::get_if<PolynomialBasis>(&form_);

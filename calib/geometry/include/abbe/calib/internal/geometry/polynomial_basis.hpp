@@ -1,6 +1,6 @@
 #pragma once
-/// The scaled design of a ball array (geometry/scaled_design.hpp) as columns: V is a polynomial in
-/// the scale readings, without tables. The polynomials are valid for one tool offset.
+/// The scaled design of a ball array (geometry/scaled_design.hpp) as columns of a model: V is a
+/// polynomial in the scale readings, without tables. The polynomials are valid for one tool offset.
 
 #include <string>
 
@@ -10,7 +10,6 @@
 
 namespace abbe::calib {
 
-/// Immutable value.
 class PolynomialBasis {
  public:
   explicit PolynomialBasis(ScaledDesign design) : design_(std::move(design)) {}
@@ -19,12 +18,13 @@ class PolynomialBasis {
   [[nodiscard]] std::size_t size() const { return design_.size(); }
   [[nodiscard]] std::size_t most_columns() const { return size(); }
 
-  /// Appends the columns. No allocation; needs space for most_columns().
+  /// Appends the columns at this state. Does not allocate; `columns` needs space for
+  /// most_columns().
   void append_columns(const MachineState&, ModelColumns&) const;
-  /// V = B c. No allocation.
+  /// V = B c at this state, B: ScaledDesign::B(). Does not allocate.
   [[nodiscard]] Vector3 V_m(const MachineState&, std::span<const double> c_m) const;
 
-  /// "k_exz2".
+  /// Name of a coefficient, such as "k_exz2".
   [[nodiscard]] std::string label(std::size_t parameter) const {
     return design_.equivalent().names()[parameter];
   }

@@ -9,7 +9,8 @@
 
 namespace abbe::calib {
 
-/// Levers of X, Y, Z.
+/// Levers of X, Y, Z in m: from each axis to the target (l_a in rigid_body_model.hpp). q: axis
+/// position, t: target offset.
 [[nodiscard]] inline std::array<Vector3, 3> levers_m(const KinematicChain& chain, const Vector3& q,
                                                      const Vector3& t) {
   std::array<Vector3, 3> levers;

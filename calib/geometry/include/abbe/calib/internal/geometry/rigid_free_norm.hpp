@@ -1,6 +1,4 @@
 #pragma once
-/// Root mean squares of a volumetric error and of its uncertainty over a set of places, after
-/// removal of the best-fit rigid motion.
 
 #include <Eigen/Core>
 #include <span>
@@ -9,9 +7,10 @@
 
 namespace abbe::calib {
 
-/// V at n places is D c, c: coefficients of a model. V after removal of the best-fit rigid motion
-/// is P D c, P: projection. The class stores D^T P D / n, from which the mean squares for any c and
-/// for any covariance of c follow.
+/// Root mean squares of V and of its uncertainty over n places, after removal of the best-fit rigid
+/// motion. V at the places is D c, c: coefficients of a model; after the removal it is P D c, P:
+/// projection. The class stores D^T P D / n, from which the mean squares for any c and for any
+/// covariance of c follow.
 class RigidFreeNorm {
  public:
   /// `points_m`: points at which the rigid motion acts (axis position + tool offset). D: 3 rows per
@@ -23,7 +22,7 @@ class RigidFreeNorm {
   [[nodiscard]] double rms_m(const Eigen::VectorXd& c) const;
   /// Root sum of squares of rms_m() over the columns of `c`.
   [[nodiscard]] double rms_of_columns_m(const Eigen::MatrixXd& c) const;
-  /// Root mean square of the standard uncertainty of V (root of the trace).
+  /// Root mean square of the standard uncertainty of V for a covariance of c (root of the trace).
   [[nodiscard]] double rms_u_m(const Eigen::MatrixXd& covariance) const;
 
  private:

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kPointsOfDiagonal = 21;
 constexpr std::array<std::string_view, 4> kDiagonals{"PPP", "NPP", "PNP", "NNP"};
 
-/// A diagonal, with V along it.
+/// A body diagonal with the component of V along it.
 class DiagonalLine {
  public:
   DiagonalLine(const ErrorFunctions& functions, const Diagonal& d)
@@ -24,7 +24,7 @@ class DiagonalLine {
         first_(functions.row(from_m_, along_)) {}
 
   [[nodiscard]] double length_m() const { return length_m_; }
-  /// Row of the component of V along the diagonal, relative to that at its beginning.
+  /// Row a: a U is the component of V along the diagonal, relative to its value at the beginning.
   [[nodiscard]] Eigen::RowVectorXd row(double at_m, const AxisTravel& travel) const {
     return functions_->row(from_m_ + at_m * along_, along_, travel) - first_;
   }
@@ -40,8 +40,8 @@ class DiagonalLine {
     return rows;
   }
 
-  /// Beginning, end, and the positions at which an axis is at a node. A model that is curved
-  /// between its nodes: each part between two of these is divided by eight.
+  /// Distances of the beginning, the end, and all positions at which an axis is at a node. If the
+  /// model is curved between its nodes, each part between two of these is divided by eight.
   [[nodiscard]] std::vector<double> kinks_m() const {
     std::vector<double> at_m{0.0, length_m_};
     for (const Axis axis : kAllAxes) {
@@ -75,7 +75,8 @@ class DiagonalLine {
   Eigen::RowVectorXd first_;
 };
 
-/// The vertex of the parabola through the values f at 0, 1/2, 1, if it is between 0 and 1.
+/// Position of the vertex of the parabola through the values f at 0, 1/2 and 1, if it is between 0
+/// and 1.
 std::optional<double> vertex_of(double f0, double f_half, double f1) {
   const double bend = f0 - 2.0 * f_half + f1;  // f(t) = f0 + (f1 - f0 - 2 bend) t + 2 bend t^2
   if (bend == 0.0) {
@@ -85,10 +86,10 @@ std::optional<double> vertex_of(double f0, double f_half, double f1) {
   return t > 0.0 && t < 1.0 ? std::optional(t) : std::nullopt;
 }
 
-/// A value along the diagonal.
+/// A quantity as a function of the distance along the diagonal.
 using Curve = std::function<double(double at_m)>;
 
-/// The kinks, and the extremes of each curve between them.
+/// The positions kinks_m(), and the extremes of each curve between them.
 std::vector<double> positions_of_extremes_m(const DiagonalLine& line,
                                             std::span<const Curve> curves) {
   const std::vector<double> kinks_m = line.kinks_m();

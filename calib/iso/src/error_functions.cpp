@@ -10,8 +10,9 @@
 namespace abbe::calib::iso {
 namespace {
 
-/// Covariance of tables and differences. That of the model contains half the differences, because
-/// there the direction of travel is not known; here it is.
+/// Joint covariance of tables and differences between directions. The covariance of the model
+/// contains half the differences, because it is for an unknown direction of travel. Here the
+/// direction is known, and this part is removed.
 Eigen::MatrixXd covariance_with_travel(const VolumetricModel& model) {
   if (model.travel() == nullptr) {
     return model.covariance();
@@ -31,10 +32,11 @@ const TableBasis& basis_of(const VolumetricModel& model) {
   return model.travel() != nullptr ? *model.travel_tables() : *model.tables();
 }
 
-/// Columns e = P^T L D^(1/2) z with cov = P^T L D L^T P and standard normal z. The same for a
-/// covariance in every run.
+/// Draws errors e with the given covariance: e = P^T L D^(1/2) z with cov = P^T L D L^T P and
+/// standard normal z, one per column. The same covariance gives the same draws in every run.
 Eigen::MatrixXd drawn_from(const Eigen::MatrixXd& covariance) {
-  constexpr Eigen::Index kDraws = 128;  // with their opposites: a mean to 6 % of the scatter
+  constexpr Eigen::Index kDraws = 128;  // and their opposites; a mean then has an error of 6 % of
+                                        // the scatter
   const Eigen::LDLT<Eigen::MatrixXd> factors(covariance);
   NormalDeviates normal(1);
   Eigen::MatrixXd z(covariance.rows(), kDraws);
@@ -50,7 +52,8 @@ Eigen::MatrixXd drawn_from(const Eigen::MatrixXd& covariance) {
 /// value in a cell.
 constexpr int kMostCells = 5;
 
-/// Coefficients are 1 for translations and metres for rotations: smaller ones are rounding.
+/// True if the coefficients are only rounding errors. Coefficients are 1 for translations and
+/// levers in metres for rotations.
 template <class Derived>
 bool is_none(const Eigen::MatrixBase<Derived>& coefficients) {
   constexpr double kRounding = 1e-9;

@@ -1,5 +1,4 @@
 #pragma once
-/// Linear functions of the parameters of a model, with value and uncertainty.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -11,22 +10,22 @@
 
 namespace abbe::calib::iso {
 
-/// Refers to the model and must not outlive it. The misfit of the model (misfit.hpp) is part of all
-/// uncertainties: that of a table is one more independent error of each of its nodes, that of V one
-/// error of each component in each cell of the volume.
+/// Linear functions of the parameters of a model, with value and uncertainty. Refers to the model,
+/// which must outlive it. All uncertainties include the misfit of the model (misfit.hpp). The
+/// misfit of a table is an additional independent error of each node; the misfit of V is one error
+/// of each component in each cell of the volume.
 class ErrorFunctions {
  public:
   explicit ErrorFunctions(const VolumetricModel&);
 
   [[nodiscard]] const VolumetricModel& model() const { return *model_; }
   [[nodiscard]] bool has_travel() const { return model_->travel() != nullptr; }
-  /// Row a such that a U is the component of V along the unit vector `along`, U: the parameters,
-  /// followed by the differences between the directions of travel and, with a misfit of V, by this
-  /// misfit, whose value is 0. With an unknown direction of an
-  /// axis: the mean of both.
+  /// Row a: a U is the component of V along the unit vector `along`. U contains the parameters,
+  /// then the differences between the directions of travel, then (with a misfit of V) this misfit,
+  /// whose value is 0. For an axis with an unknown direction: the mean of both.
   [[nodiscard]] Eigen::RowVectorXd row(const Vector3& q_m, const Vector3& along,
                                        const AxisTravel& travel = {}) const;
-  /// Row of a table at a position of its axis.
+  /// Row a: a U is the value of the table at a position of its axis.
   [[nodiscard]] Eigen::RowVectorXd table_row(const Table&, double position_m) const;
   [[nodiscard]] double value(const Eigen::RowVectorXd& row) const { return row.dot(U_); }
   [[nodiscard]] Value with_u(const Eigen::RowVectorXd& row) const;
@@ -34,11 +33,11 @@ class ErrorFunctions {
   [[nodiscard]] Eigen::VectorXd variances(const Eigen::MatrixXd& rows) const {
     return (rows * covariance_).cwiseProduct(rows).rowwise().sum();
   }
-  /// A difference between the directions of travel that has an effect in `rows` is not determined
-  /// by the measurement: only its prior is known.
+  /// True if `rows` depend on a difference between the directions of travel that the measurement
+  /// does not determine (only its prior is known).
   [[nodiscard]] bool has_undetermined_travel(const Eigen::MatrixXd& rows) const;
-  /// Errors of the parameters as their covariance has them: parameters x draws. The opposite of
-  /// each is as probable.
+  /// Errors drawn from the covariance of the parameters: parameters x draws. The opposite of each
+  /// draw is equally probable.
   [[nodiscard]] const Eigen::MatrixXd& drawn_errors() const { return drawn_errors_; }
 
  private:
@@ -52,20 +51,20 @@ class ErrorFunctions {
   Eigen::VectorXd U_;
   Eigen::MatrixXd covariance_;
   Eigen::MatrixXd drawn_errors_;
-  std::vector<bool> undetermined_;  ///< of each parameter
+  std::vector<bool> undetermined_;  ///< for each parameter
 };
 
-/// c y of excess_of().
+/// The vector c y of excess_of(): the values reduced to their size without noise.
 [[nodiscard]] inline Eigen::VectorXd true_size_of(const Eigen::VectorXd& y,
                                                   const Eigen::MatrixXd& e) {
   const double noise = e.squaredNorm() / static_cast<double>(e.cols()), size = y.squaredNorm();
   return (size > noise ? std::sqrt(1.0 - noise / size) : 0.0) * y;
 }
 
-/// By how much noise raises the statistic s of values on average:
+/// Mean increase of the statistic s of values by noise:
 ///     b = max(0, mean over drawn e of s(c y + e) - s(c y)),  c^2 = max(0, 1 - E|e|^2 / |y|^2)
-/// y: estimated values, e: a drawn error or its opposite, c y: values of the size that the true
-/// ones have, since |y|^2 is |true y|^2 + E|e|^2 on average. `e`: values x draws.
+/// y: estimated values, e: a drawn error or its opposite. c y has the size of the true values,
+/// because |y|^2 is |true y|^2 + E|e|^2 on average. `e`: values x draws.
 template <class Statistic>
 [[nodiscard]] double excess_of(const Eigen::VectorXd& y, const Eigen::MatrixXd& e,
                                const Statistic& s) {
@@ -77,14 +76,14 @@ template <class Statistic>
   return std::max(0.0, sum / (2.0 * static_cast<double>(e.cols())) - s(true_y));
 }
 
-/// Standard uncertainty of a statistic s of values of which one linear function l, with the
-/// standard uncertainty u_l, has the value s(y) at the estimate: of the difference at the two
-/// positions with the largest and the smallest value, for a range.
+/// Standard uncertainty of a statistic s of the values y, for example of a range. l is a linear
+/// function of the values with l = s(y) at the estimate (for a range: the difference between the
+/// positions of the largest and the smallest value), u_l its standard uncertainty.
 ///     u^2 = u_l^2 + max(b^2, mean over drawn e of (s(c y + e) - s(c y))^2 - (l e)^2)
-/// b, c, e: see excess_of(). Where e does not change which values are the largest and the smallest,
-/// s is l, and the second term is 0. Where it does, the others count with their own uncertainty:
-/// the largest value may be at a position that is not well known, while the estimate has it
-/// elsewhere. `l`: l e of each column of `e`.
+/// b, c, e: see excess_of(). If no e changes which values are the largest and the smallest, s is l,
+/// and the second term is 0. Otherwise other positions contribute their uncertainty, too: the true
+/// largest value may be at a position whose value is not well known. `l`: l e for each column of
+/// `e`.
 template <class Statistic>
 [[nodiscard]] double u_of(double u_l, const Eigen::VectorXd& y, const Eigen::MatrixXd& e,
                           const Eigen::RowVectorXd& l, const Statistic& s) {
@@ -99,17 +98,17 @@ template <class Statistic>
   return std::sqrt(u_l * u_l + std::max(b * b, squares / static_cast<double>(e.cols())));
 }
 
-/// The largest minus the smallest of a U over the rows a. Requires at least one row.
+/// Range: the largest minus the smallest a U over the rows a. Requires at least one row.
 [[nodiscard]] Value range_of(const ErrorFunctions&, const Eigen::MatrixXd& rows);
-/// The a U with the largest |a U|.
+/// The a U with the largest |a U| over the rows a.
 [[nodiscard]] Value largest_of(const ErrorFunctions&, const Eigen::MatrixXd& rows);
 
-/// Systematic deviation E and reversal B of the same positions, approached in both directions
+/// Systematic deviation E and reversal error B of positions that are approached in both directions
 /// [ISO 230-2].
 struct Bidirectional {
   Value E, B;
 };
-/// None if the measurement does not determine the difference between the directions.
+/// nullopt if the measurement does not determine the difference between the directions.
 [[nodiscard]] std::optional<Bidirectional> bidirectional_of(const ErrorFunctions&,
                                                             const Eigen::MatrixXd& up,
                                                             const Eigen::MatrixXd& down);

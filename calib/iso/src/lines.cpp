@@ -6,13 +6,15 @@
 namespace abbe::calib::iso {
 namespace {
 
-// [ISO 230-2] for axes up to 2 m; for longer ones fewer per metre are allowed.
+// Least numbers of targets of [ISO 230-2] for axes up to 2 m; for longer axes it permits fewer per
+// metre.
 constexpr double kFewestTargets = 5.0, kFewestPerMetre = 5.0;
-// Models that are curved between their nodes: a chord differs from a polynomial of order 5 by less
-// than 1 % of its range.
+// Number of targets for models that are curved between their nodes: a chord then differs from a
+// polynomial of order 5 by less than 1 % of its range.
 constexpr double kTargetsOfCurve = 41.0;
 
-/// The largest factor with which all corners of the box about `centre_m` are in the volume.
+/// The largest factor, at most 1, by which the box with half width `half_m` about `centre_m` can be
+/// scaled so that all corners are in the volume.
 double largest_factor(const ValidityVolume& volume, const Vector3& centre_m,
                       const Vector3& half_m) {
   const auto holds = [&](double factor) {
@@ -29,7 +31,7 @@ double largest_factor(const ValidityVolume& volume, const Vector3& centre_m,
     return 1.0;
   }
 
-  constexpr int kSteps = 30;  // 1 nm of 1 m
+  constexpr int kSteps = 30;  // bisections: 1 nm of 1 m
   double inside = 0.0, outside = 1.0;
   for (int i = 0; i < kSteps; ++i) {
     const double middle = 0.5 * (inside + outside);
@@ -38,7 +40,7 @@ double largest_factor(const ValidityVolume& volume, const Vector3& centre_m,
   return inside;
 }
 
-/// Halves the longest interval until there are enough targets.
+/// Halves the longest interval repeatedly until there are enough targets.
 void complete(std::vector<double>& targets_m, double least) {
   const double length_m = targets_m.back() - targets_m.front();
   const double fewest = std::max(least, std::ceil(kFewestPerMetre * length_m - 1e-9));

@@ -68,7 +68,7 @@ Straightness straightness_of(const ErrorFunctions& functions, const AxisLine& li
   return s;
 }
 
-/// Row of the slope of component `of` of V on a line.
+/// Row a: a U is the slope of component `of` of V on a line.
 Eigen::RowVectorXd slope_row(const ErrorFunctions& functions, const AxisLine& line, Axis of) {
   return ReferenceLine(line.targets_m).slope * line.rows(functions, index(of));
 }

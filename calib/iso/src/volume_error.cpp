@@ -22,14 +22,14 @@ std::vector<Vector3> lattice_of(const LineBox& box, int per_side) {
   return points_m;
 }
 
-/// A point, and V there.
+/// An axis position and the V at this position.
 struct VAtPoint {
   Vector3 q_m = Vector3::Zero(), V_m = Vector3::Zero();
 };
 
-/// Standard uncertainty of the largest |V|: that of V at this point along V, `u_m`, and what the
-/// other points add (u_of()). Neighbouring points of a fine lattice have the same errors: a coarse
-/// one, and the point itself, are enough.
+/// Standard uncertainty of the largest |V|. It combines `u_m`, the uncertainty of V at this point
+/// along V, with the contribution of other points (u_of()). A coarse lattice and the point itself
+/// are enough, because neighbouring points of a fine lattice have the same errors.
 double u_of_largest(const ErrorFunctions& functions, const LineBox& box, const VAtPoint& largest,
                     double u_m) {
   constexpr int kPerSide = 5;
@@ -56,7 +56,7 @@ double u_of_largest(const ErrorFunctions& functions, const LineBox& box, const V
   });
 }
 
-/// Mean and largest U(V) over a lattice without the rigid motion that fits best to it.
+/// Mean and maximum of U(V) over a lattice, after removal of the best-fit rigid motion.
 struct UOfShape {
   double mean_m = 0.0, max_m = 0.0;
 };

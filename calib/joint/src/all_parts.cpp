@@ -13,7 +13,7 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// Effects of two parts or more.
+/// Names of the effects that at least two parts have.
 std::vector<std::string> shared_effects(std::span<const Part> parts) {
   std::map<std::string, std::size_t> count;
   for (const Part& part : parts) {
@@ -30,7 +30,7 @@ std::vector<std::string> shared_effects(std::span<const Part> parts) {
   return shared;
 }
 
-/// Orthonormal basis of the columns.
+/// Orthonormal basis of the space that the columns of A span.
 Eigen::MatrixXd basis_of_columns(Eigen::MatrixXd A) {
   constexpr double kRounding = 1e-10;  // as in determining_rows()
   for (auto column : A.colwise()) {
@@ -75,7 +75,8 @@ Eigen::VectorXd AllParts::without_model(const Eigen::VectorXd& rows) const {
 
 std::optional<AllParts::Directed> AllParts::directed(std::size_t part,
                                                      const Eigen::VectorXd& column) const {
-  constexpr double kUndetermined = 1e-9;  // of the length of the column: rounding
+  constexpr double kUndetermined = 1e-9;  // relative to the length of the column; below it is
+                                          // rounding
   const RowsOfPart& of = parts_[part];
   Eigen::VectorXd a = Eigen::VectorXd::Zero(w_.size());
   a.segment(of.first, of.of_e.rows()) = of.of_e * column;

@@ -9,7 +9,8 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// nullopt if the parts leave a combination undetermined.
+/// rms standard uncertainty of V of the joint model; nullopt if the parts leave a combination
+/// undetermined.
 Result<std::optional<double>> u_of(std::span<const Part> parts, const CommonTables& common) {
   const Result<JointModel> joint = joint_model(parts, common);
   if (joint) {

@@ -7,8 +7,8 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// 1 / length of every column, 1 / the longest for a column that consists of rounding errors: that
-/// of an effect which the data cannot separate from the pose of the array.
+/// 1 / length of every column. A column that consists of rounding errors gets 1 / the longest
+/// length; it belongs to an effect that the data cannot separate from the pose of the array.
 Eigen::VectorXd inverse_lengths(const Eigen::MatrixXd& R) {
   constexpr double kRounding = 1e-13;
   const Eigen::VectorXd length = R.colwise().norm();
@@ -22,7 +22,7 @@ Eigen::VectorXd inverse_lengths(const Eigen::MatrixXd& R) {
 
 DeterminingRows determining_rows(const estimation::Information& data) {
   // Pivots of rounding errors are 1e-13 of the largest or less; a combination with a pivot of 1e-10
-  // has an uncertainty beyond any use.
+  // has an uncertainty that is too large to be useful.
   constexpr double kRounding = 1e-10;
   const Eigen::MatrixXd R = data.R();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;

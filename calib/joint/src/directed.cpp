@@ -15,14 +15,14 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// Probability of a larger |d| if both are the same.
+/// Probability of a larger |d| if the part and the others have the same value.
 double p_of(const AllParts::Directed& found) {
   const double t = found.d / found.u;
   return found.dof > 0.0 ? student_tail(t, static_cast<std::size_t>(std::max(1.0, found.dof)))
                          : exponential(log_chi2_tail(t * t, 1));
 }
 
-/// What a wrong length of a part of this method comes from.
+/// Probable causes of a wrong length of a part, for the method of the part.
 std::string causes_of_length(const std::string& method) {
   if (method == "otf") {
     return "wrong scale of the tracker's ranges";
@@ -48,7 +48,8 @@ std::string causes(const DirectedTest& t, std::span<const Part> parts) {
   return text;
 }
 
-/// Of two parts one test is that of both.
+/// Index of the first part that is tested. With two parts one test is enough: the test of the other
+/// part would be the same.
 std::size_t first_tested(std::size_t parts) {
   return parts == 2 ? 1 : 0;
 }
@@ -56,7 +57,7 @@ std::size_t first_tested(std::size_t parts) {
 }  // namespace
 
 std::vector<Direction> directions(const DatumCoordinates& c, const ParameterLayout& layout) {
-  constexpr double kLengthShare = 0.7, kAxesShare = 0.2;  // with kShareOfPairs: 1
+  constexpr double kLengthShare = 0.7, kAxesShare = 0.2;  // the sum with kShareOfPairs is 1
   const Eigen::MatrixX3d of_axis = c.N.transpose() * axis_scale_columns(layout);
   std::vector<Direction> all{{kLength, false, of_axis.rowwise().sum(), kLengthShare}};
   for (const Axis a : kAllAxes) {

@@ -11,23 +11,24 @@
 
 namespace abbe::calib::joint {
 
-/// Share of the false alarms of all tests that the chi-square tests of the pairs take.
+/// Share of the false-alarm probability of all tests that belongs to the chi-square tests of the
+/// pairs.
 inline constexpr double kShareOfPairs = 0.1;
 
-/// One combination of the coordinates, whose value is one quantity of the machine.
+/// A combination of the coordinates e (`column`) that represents one quantity of the machine.
 struct Direction {
-  std::string name;  ///< "length", "scale of X", "EC0Y"
+  std::string name;  ///< "length", or such as "scale of X", "EC0Y"
   bool is_angle = false;
   Eigen::VectorXd column;
-  double share = 0.0;  ///< of the false alarms of all tests
+  double share = 0.0;  ///< share of the false-alarm probability of all tests
 };
-/// Length, scales of X, Y, Z, squareness.
+/// Returns the directions: length, scales of X, Y, Z, squareness errors.
 [[nodiscard]] std::vector<Direction> directions(const DatumCoordinates&, const ParameterLayout&);
 
-/// A directed test with what the order of the causes needs.
+/// A directed test, with log_p to sort the explanations.
 struct DirectedFinding {
   DirectedTest test;
-  double log_p = 0.0;  ///< of the improvement, as Explanation::log_p
+  double log_p = 0.0;  ///< as Explanation::log_p
 };
 [[nodiscard]] std::vector<DirectedFinding> directed_findings(std::span<const Part>,
                                                              const DatumCoordinates&,

@@ -19,8 +19,8 @@ namespace {
 
 constexpr std::size_t kMostExplanations = 3, kMostTables = 3;
 
-/// An explanation must leave a disagreement that occurs with a larger probability than this, and
-/// that is no contradiction: larger than the limit of the test.
+/// Limit of the probability of the disagreement that remains under an explanation. The probability
+/// must be larger than kLikely, and larger than the limit of the test (no contradiction).
 double least_likely(const PairTest& test) {
   constexpr double kLikely = 1e-3;
   return std::max(kLikely, test.all.limit);
@@ -30,7 +30,7 @@ bool agrees(const Disagreement& d, double least) {
   return d.dof == 0 || d.log_p > natural_logarithm(least);
 }
 
-/// The best ones first.
+/// Sorts the explanations so that the best one is first.
 void sort_by_fit(std::vector<Explanation>& all) {
   std::stable_sort(all.begin(), all.end(),
                    [](const Explanation& a, const Explanation& b) { return a.log_p < b.log_p; });
@@ -46,13 +46,13 @@ DeterminingRows with_reversed_table(DeterminingRows rows, const DatumGroup& grou
   return rows;
 }
 
-/// True values = factor * given ones, noise too.
+/// Rows for the hypothesis that true values = factor * given values; the noise is multiplied, too.
 DeterminingRows with_unit(DeterminingRows rows, double factor) {
   rows.A /= factor;
   return rows;
 }
 
-/// Mistakes that no unknown describes.
+/// Tests mistakes that no unknown describes, such as a wrong sign or unit.
 class Hypotheses {
  public:
   Hypotheses(const PairProblem& pair, const Part& i, const Part& j, double least)
@@ -90,7 +90,7 @@ class Hypotheses {
     }
   }
 
-  /// The best ones.
+  /// The best explanations, at most kMostExplanations.
   [[nodiscard]] std::vector<Explanation> best() {
     sort_by_fit(found_);
     found_.resize(std::min(kMostExplanations, found_.size()));
@@ -101,7 +101,8 @@ class Hypotheses {
   void test(std::string text, const DeterminingRows& i, const DeterminingRows& j) {
     test(std::move(text), i, j, given_);
   }
-  /// `given`: squares of the parts as given. A hypothesis must fit better.
+  /// Tests a hypothesis with the rows i and j. `given`: sum of squares of the parts as given. The
+  /// hypothesis must have a smaller sum.
   void test(std::string text, const DeterminingRows& i, const DeterminingRows& j, double given) {
     const double log_p = log_chi2_tail(given - pair_.squares(i, j), 1);
     if (log_p < 0.0 && agrees(pair_.disagreement(i, j), least_)) {
@@ -116,7 +117,7 @@ class Hypotheses {
   std::vector<Explanation> found_;
 };
 
-/// "lengths of j are larger than those of i by 20.3 um/m (u 1.7 um/m)".
+/// Text such as "lengths of j are larger than those of i by 20.3 um/m (u 1.7 um/m)".
 std::string text_of(const Direction& direction, const PairProblem::Freed& freed, const Part& i,
                     const Part& j) {
   const std::string size =
@@ -129,11 +130,11 @@ std::string text_of(const Direction& direction, const PairProblem::Freed& freed,
   return message("the ", direction.name, " of ", j.name, " is larger than that of ", i.name, size);
 }
 
-/// The difference in one direction that fits best.
+/// Adds the explanation by a difference in one direction: that direction which fits best.
 void explain_by_directions(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
                            const DatumCoordinates& c, const ParameterLayout& layout) {
   std::optional<Explanation> best;
-  double best_excess = 0.0;  // beyond the limit, as in the directed tests
+  double best_excess = 0.0;  // distance from the limit as in the directed tests
   for (const Direction& direction : directions(c, layout)) {
     const PairProblem::Freed freed = pair.freed(direction.column);
     const double log_p = log_chi2_tail(freed.drop, 1);
@@ -167,7 +168,7 @@ TableDifference difference_of(const DatumGroup& group, const DatumCoordinates& c
   return result;
 }
 
-/// Columns of the coordinates of the tables.
+/// Columns that let the coordinates of the given tables change independently.
 Eigen::MatrixXd columns_of(const std::vector<const DatumGroup*>& tables, Eigen::Index m) {
   Eigen::Index size = 0;
   for (const DatumGroup* group : tables) {
@@ -182,7 +183,8 @@ Eigen::MatrixXd columns_of(const std::vector<const DatumGroup*>& tables, Eigen::
   return free;
 }
 
-/// The table whose freedom decreases X2 most significantly, with those already free.
+/// The table that decreases X2 most significantly if it may differ, in addition to the tables
+/// `already` free.
 const DatumGroup* most_significant_table(const PairProblem& pair, const DatumCoordinates& c,
                                          const std::vector<const DatumGroup*>& already,
                                          double least, ChiSquare& best_test) {

@@ -20,8 +20,8 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// An effect of several parts is one unknown, a multiple of its standard uncertainty: all of them
-/// must state the same one.
+/// Checks that parts which share an effect state the same standard uncertainty. Necessary because
+/// the common unknown is a multiple of it.
 Result<void> check_same_effects(std::span<const Part> parts) {
   constexpr double kSame = 1e-6;  // relative; uncertainties in files are decimal numbers
   std::map<std::string, std::pair<double, const Part*>> stated;
@@ -82,7 +82,7 @@ Result<void> check_test(std::span<const Part> parts, const CommonTables& common,
   return {};
 }
 
-/// The union of the effects, in the order in which parts name them.
+/// Names of the effects of all parts, without repetition, in the order in which parts name them.
 std::vector<std::string> all_effects(std::span<const Part> parts) {
   std::vector<std::string> all;
   for (const Part& part : parts) {
@@ -95,7 +95,7 @@ std::vector<std::string> all_effects(std::span<const Part> parts) {
   return all;
 }
 
-/// Name of the table of a coordinate, or of an effect.
+/// Name of the table to which a coordinate belongs, or name of an effect.
 std::string label_of(std::size_t unknown, const DatumCoordinates& c,
                      const std::vector<std::string>& effects) {
   const auto at = static_cast<Eigen::Index>(unknown);
@@ -123,7 +123,7 @@ std::string text_of(const PairTest& t, std::span<const Part> parts) {
   return text;
 }
 
-/// The directed test that is farthest beyond its limit.
+/// The directed test whose p is farthest below its limit.
 const DirectedFinding* most_significant(const std::vector<DirectedFinding>& findings) {
   const auto excess = [](const DirectedFinding& f) {
     return natural_logarithm(f.test.limit) - f.log_p;
@@ -136,11 +136,12 @@ const DirectedFinding* most_significant(const std::vector<DirectedFinding>& find
   return best;
 }
 
-/// See JointIdentification::contradictions.
+/// Texts as described at JointIdentification::contradictions.
 std::vector<std::string> contradictions_of(const std::vector<PairTest>& pairs,
                                            const std::vector<DirectedFinding>& findings,
                                            std::span<const Part> parts) {
-  constexpr double kRounding = 1e-6;  // of a pair, the same direction can be the best explanation
+  constexpr double kRounding = 1e-6;  // the best explanation of a pair can be the same direction
+                                      // with a rounding difference
   const DirectedFinding* directed = most_significant(findings);
   bool first = directed != nullptr && directed->test.explains;
   std::vector<std::string> texts;
@@ -151,7 +152,8 @@ std::vector<std::string> contradictions_of(const std::vector<PairTest>& pairs,
                         pair.explanations.front().log_p >= (1.0 + kRounding) * directed->log_p);
     }
   }
-  if (directed != nullptr) {  // it shows which of three parts differs, which a pair does not
+  if (directed != nullptr) {  // with three or more parts this test shows which part differs; a pair
+                              // test does not
     texts.insert(first ? texts.begin() : texts.end(), text(directed->test, parts));
   }
   return texts;
@@ -167,7 +169,7 @@ Misfit largest_misfit(std::span<const Part> parts) {
   return largest;
 }
 
-/// Without the interior points of large parts.
+/// Hull of the covered positions of all parts; interior points of large parts are left out.
 Result<ValidityVolume> validity_of(std::span<const Part> parts) {
   std::vector<Vector3> covered;
   for (const Part& part : parts) {
@@ -216,7 +218,7 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
     sum.add_prior(static_cast<std::size_t>(m) + k, 0.0, 1.0);
   }
 
-  // The coordinates satisfy the conditions of the datum: no other condition is left.
+  // No datum conditions are needed: the coordinates e already satisfy them.
   const estimation::Datum no_conditions(
       Eigen::MatrixXd(0, static_cast<Eigen::Index>(sum.unknowns())));
   const Result<estimation::DatumSolution> solved = no_conditions.solve(

@@ -47,7 +47,7 @@ struct FoldedRun {
   }
 };
 
-/// The observations without the rows of a fold.
+/// The observations of the run without the rows of a fold.
 otf::Observations without_fold(const FoldedRun& folded, std::size_t fold) {
   const otf::Observations& all = *folded.run.observations;
   otf::Observations rest = all;
@@ -62,7 +62,8 @@ otf::Observations without_fold(const FoldedRun& folded, std::size_t fold) {
   return rest;
 }
 
-/// The model of all parts without a fold; nullopt if they do not determine it.
+/// The model of all parts without the legs of a fold; nullopt if the remaining data do not
+/// determine it.
 Result<std::optional<VolumetricModel>> model_without_fold(std::span<const Part> parts,
                                                           const std::vector<FoldedRun>& runs,
                                                           const CommonTables& common,
@@ -98,7 +99,7 @@ Result<std::optional<VolumetricModel>> model_without_fold(std::span<const Part> 
   return std::move(joint->model);
 }
 
-/// Causes of reasons that concern the model of one part alone (Verdict::causes).
+/// True for causes (Verdict::causes) that concern only the model of one part alone.
 bool concerns_own_model(std::string_view cause) {
   constexpr std::array<std::string_view, 9> kOwn{"held-out", "nowhere",    "size",
                                                  "slope",    "volume",     "scale-change",

@@ -1,5 +1,4 @@
 #pragma once
-/// How far an estimated variance of the noise may be too small (joint/identify.hpp).
 
 #include <algorithm>
 #include <cmath>

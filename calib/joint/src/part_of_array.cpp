@@ -16,8 +16,8 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// The unknowns of the groups: parameters, effects of the scales, left-out rotations, errors of the
-/// array.
+/// The unknowns of the part of an array, in this order: parameters, effects of the scales, left-out
+/// rotations, errors of the array.
 class ArrayUnknowns {
  public:
   ArrayUnknowns(const evemu::Observations& o, const CommonTables& common,
@@ -72,7 +72,7 @@ std::vector<std::size_t> counted(std::size_t first, std::size_t end) {
   return all;
 }
 
-/// Information of all groups about all unknowns, with s = `s_m`.
+/// Information of all groups about all unknowns, for the standard deviation s_m of a ball centre.
 Result<estimation::Information> information_of_array(const evemu::Observations& o,
                                                      const ArrayUnknowns& unknowns, double s_m,
                                                      const Eigen::VectorXd& U) {
@@ -97,12 +97,13 @@ Result<estimation::Information> information_of_array(const evemu::Observations& 
 struct ArrayNoise {
   double s_m = 0.0, dof = 0.0;
 };
-/// s from the residuals of an adjustment with s = `s_m` and the priors of the errors of the array.
-/// Without the priors a common scale of tables and array, which no data determine, would multiply
-/// the noise of the readings in the design and reproduce the residuals.
+/// Estimates s from the residuals of an adjustment with s = `s_m` and the priors of the errors of
+/// the array. The priors are necessary: a common scale of tables and array is not determined by any
+/// data. Without priors it would multiply the noise of the readings in the design and thus
+/// reproduce the residuals.
 Result<ArrayNoise> residual_noise_of_array(estimation::Information with_s, std::size_t first_error,
                                            double s_m, double most_s_m) {
-  constexpr double kLeastDof = 20.0;  // s is then known to 16 %
+  constexpr double kLeastDof = 20.0;  // s then has an uncertainty of 16 %
   for (std::size_t k = first_error; k < with_s.unknowns(); ++k) {
     with_s.add_prior(k, 0.0, 1.0);
   }
@@ -127,7 +128,8 @@ Result<ArrayNoise> residual_noise_of_array(estimation::Information with_s, std::
 
 evemu::Observations with_changed_errors(evemu::Observations o, const Matrix3& of_reading,
                                         const Matrix3& of_V) {
-  // Touched points belong to the readings as given: the changed ones use ball centres.
+  // The touched points are removed: they belong to the readings as given. The changed observations
+  // use ball centres.
   o.seen.clear();
   o.artefact.reset();
   for (evemu::BallError& row : o.rows) {
@@ -154,7 +156,8 @@ struct ChangedArray {
   evemu::Observations observations;
 };
 
-/// What is often wrong with errors of balls: axes of V, or of readings and V.
+/// Typical mistakes in files of ball errors: the axes of V, or of readings and V, are reversed or
+/// swapped.
 std::vector<ChangedArray> changed_axes(const evemu::Observations& o, const CommonTables& common) {
   std::vector<ChangedArray> changed;
   for (const AxisMistake& mistake : axis_mistakes()) {
@@ -169,7 +172,7 @@ std::vector<ChangedArray> changed_axes(const evemu::Observations& o, const Commo
   return changed;
 }
 
-/// A wrong stylus.
+/// Observations with another stylus, for the hypothesis of a wrong tool offset.
 std::vector<ChangedArray> changed_tools(const evemu::Observations& o, const CommonTables& common) {
   std::vector<ChangedArray> changed;
   const Vector3& t = o.machine.tool_offset_m;
@@ -184,14 +187,15 @@ std::vector<ChangedArray> changed_tools(const evemu::Observations& o, const Comm
   return changed;
 }
 
-/// The noise that was stated, or that of the residuals.
+/// The stated noise of a ball centre, or an estimate from the residuals if none is stated.
 Result<ArrayNoise> noise_of_array(const evemu::Observations& o, const CommonTables& common,
                                   const ArrayOptions& options) {
   if (options.s_m > 0.0) {
     return ArrayNoise{options.s_m, 0.0};
   }
   const ArrayUnknowns unknowns(o, common, options);
-  constexpr int kRepeats = 3;  // s and the errors of the array are separated by their priors
+  constexpr int kRepeats = 3;  // s depends on the errors of the array, and their separation depends
+                               // on s
   ArrayNoise noise{1e-6, 0.0};
   for (int i = 0; i < kRepeats; ++i) {
     Result<ArrayNoise> next =
@@ -226,7 +230,7 @@ Result<Part> array_part(const evemu::Observations& o, const CommonTables& common
               .dof_of_noise = noise.dof};
 }
 
-/// The information with columns of zeros for effects at the end that it does not have.
+/// The information extended by columns of zeros at the end, for effects that it does not contain.
 estimation::Information with_all_effects(const estimation::Information& some,
                                          std::size_t unknowns) {
   estimation::Information all(unknowns);
@@ -234,9 +238,9 @@ estimation::Information with_all_effects(const estimation::Information& some,
   return all;
 }
 
-/// Hypotheses whose observations have the same form, `given` without a mistake. Their noise is that
-/// of the hypothesis that fits best: with a noise of its own, a wrong hypothesis would explain its
-/// own residuals.
+/// Adds hypotheses about mistakes; `given` are the observations without a mistake in the same form.
+/// All get the noise of the hypothesis that fits best. With a noise of its own, a wrong hypothesis
+/// would explain its own residuals.
 void add_mistakes(std::vector<Mistake>& mistakes, const evemu::Observations& given,
                   std::vector<ChangedArray> changed, const CommonTables& common,
                   const ArrayOptions& options, std::size_t unknowns) {
@@ -275,7 +279,8 @@ std::vector<Mistake> mistakes_of_array(const evemu::Observations& o, const Commo
   return mistakes;
 }
 
-/// "; not if the errors have Y reversed": the mistakes without which the noise is small enough.
+/// Text such as "; not if the errors have Y reversed": the mistakes whose correction makes the
+/// noise small enough.
 std::string mistakes_text(const evemu::Observations& o, const CommonTables& common,
                           const ArrayOptions& options) {
   std::vector<std::string> without;

@@ -25,8 +25,9 @@ std::vector<Table> left_out_tables(const ParameterLayout& all, const ParameterLa
   return left_out;
 }
 
-/// All 18 tables, not in a datum, from the common ones and the left-out rotations phi (columns
-/// behind them). The translations of the axis of phi contain phi x (tool of the common tables).
+/// Matrix that gives all 18 tables, not in a datum, from the common tables and the left-out
+/// rotations phi (columns after those of the common tables). The translations of the axis of phi
+/// contain phi x (tool of the common tables).
 Eigen::MatrixXd all_tables_of(const CommonTables& common, const ParameterLayout& all) {
   const ParameterLayout& given = common.basis.layout();
   const std::vector<Table> left_out = left_out_tables(all, given);
@@ -60,9 +61,10 @@ Eigen::MatrixXd all_tables_of(const CommonTables& common, const ParameterLayout&
   return M;
 }
 
-/// The same in datum G2 of all tables, which the adjustment of the bar has.
+/// The matrix all_tables_of(), transformed to datum G2 of all 18 tables, in which the bar is
+/// adjusted.
 Result<Eigen::MatrixXd> all_tables_in_datum(const CommonTables& common, const TableBasis& all) {
-  // Three tools that are not on a line: the tables describe every tool.
+  // Three tools that are not on a line, so that the 18 tables are valid for every tool.
   const std::array tools_m{Vector3(0.0, 0.0, 0.0), Vector3(0.1, 0.0, 0.0), Vector3(0.0, 0.1, 0.0)};
   const ParameterLayout& layout = all.layout();
   const estimation::Datum datum(datum_conditions(ModelDatum::G2, all, layout.fit_size()));
@@ -95,7 +97,8 @@ Result<void> check_bar(const mfb::Observations& o, const CommonTables& common) {
   return {};
 }
 
-/// Readings of the touches; those of a hole at the end of the travel are up to its radius beyond.
+/// Axis positions covered by the touches. Readings beyond the nodes are moved to the end node:
+/// touches of a hole at the end of the travel are up to its radius beyond it.
 std::vector<Vector3> covered_m(const mfb::Observations& o) {
   std::vector<Vector3> covered;
   for (const mfb::PassObservation& pass : o.passes) {
@@ -111,7 +114,8 @@ std::vector<Vector3> covered_m(const mfb::Observations& o) {
   return covered;
 }
 
-/// Rows about the common tables, the effects of the bar, and the left-out rotations.
+/// Rows of a bar, with columns for the common tables, the effects of the bar and the left-out
+/// rotations.
 struct BarRows {
   Eigen::MatrixXd of_tables, of_bar, of_left_out;
   Eigen::VectorXd y;
@@ -147,8 +151,8 @@ Result<BarRows> rows_of_bar(const mfb::WholeSystem& system, const mfb::Observati
   return rows;
 }
 
-/// What the rows state if `eliminated` may have any value, including combinations of it that they
-/// do not determine.
+/// Removes the unknowns of `eliminated` from the rows; they may have any value. Combinations of
+/// them that the rows do not determine are permitted.
 void eliminate(const Eigen::MatrixXd& eliminated, Eigen::MatrixXd& A, Eigen::VectorXd& y) {
   constexpr double kRounding = 1e-10;
   if (eliminated.cols() == 0) {

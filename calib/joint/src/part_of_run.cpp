@@ -18,8 +18,10 @@ namespace {
 
 /// Columns of the effects that a run shares with other parts, one standard uncertainty each.
 struct SharedColumns {
-  Eigen::MatrixXd G;              ///< effect of one standard uncertainty on the model
-  Eigen::MatrixXd in_covariance;  ///< what each of them adds to the covariance: column column^T
+  Eigen::MatrixXd G;              ///< change of the model parameters by one standard uncertainty of
+                                  ///< each effect
+  Eigen::MatrixXd in_covariance;  ///< columns g of these effects in the covariance of the model:
+                                  ///< each adds g g^T
   std::vector<std::string> names;
   std::vector<double> u;
 };
@@ -39,7 +41,7 @@ SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects&
     }
   };
 
-  // A relative error of the ranges enlarges the whole machine.
+  // A relative error of the ranges scales the whole machine.
   add(e.u_ranges, e.u_ranges, of_axis.rowwise().sum(), "ranges of " + e.ranges_of);
   for (const Axis a : kAllAxes) {
     const double u = e.u_axis_scale[index(a)];
@@ -54,8 +56,8 @@ SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects&
   return shared;
 }
 
-/// What the data of the run, without the prior, state about its range offset d, in units of its
-/// prior.
+/// Adds the information of the run's data, without the prior, about its range offset d. The unknown
+/// is d divided by the standard uncertainty of its prior.
 void add_offset_of_data(estimation::Information& information, const OffsetInModel& of_run,
                         Eigen::Index column) {
   if (const std::optional<OffsetOfData> data = of_data(of_run)) {
@@ -82,7 +84,8 @@ Result<void> check_offset(const std::string& part, const CommonEffects& effects,
                          shared->name, "': it needs u_range_offset, and no nests"));
 }
 
-/// "has 4 nodes of X, not 5"; empty if nodes, reference and interpolation of the axis are the same.
+/// Text such as "has 4 nodes of X, not 5"; empty if nodes, reference and interpolation of the axis
+/// are the same.
 std::string difference_of_axis(Axis axis, const TableBasis& own, const TableBasis& common) {
   constexpr double kSame_m = 1e-9;  // files contain decimal numbers in mm
   const AxisNodes &x = own.layout().nodes()[index(axis)], &y = common.layout().nodes()[index(axis)];
@@ -137,7 +140,8 @@ Result<void> check_same_layout(const std::string& name, const VolumetricModel& m
   return {};
 }
 
-/// Triangle of a covariance scaled to its diagonal; nullopt if it is not positive definite.
+/// Cholesky factor of a covariance that is scaled by its diagonal; nullopt if it is not positive
+/// definite.
 struct ScaledTriangle {
   Eigen::VectorXd scale;
   Eigen::LLT<Eigen::MatrixXd> factor;
@@ -153,7 +157,8 @@ std::optional<ScaledTriangle> scaled_triangle(const Eigen::MatrixXd& C) {
   return t;
 }
 
-/// Triangle of C - G G^T; `names`: effects of the columns of G.
+/// Cholesky factor of C - G G^T: the covariance without the effects of the columns of G, which have
+/// the names `names`.
 Result<ScaledTriangle> triangle_without_effects(const std::string& part, const Eigen::MatrixXd& C,
                                                 const Eigen::MatrixXd& G,
                                                 const std::vector<std::string>& names) {
@@ -178,7 +183,7 @@ Result<ScaledTriangle> triangle_without_effects(const std::string& part, const E
               "identified"));
 }
 
-/// W M with W^T W = C^-1.
+/// The product W M, with W^T W = C^-1.
 Eigen::MatrixXd whitened_by(const ScaledTriangle& t, const Eigen::MatrixXd& M) {
   return t.factor.matrixL().solve(t.scale.cwiseInverse().asDiagonal() * M);
 }

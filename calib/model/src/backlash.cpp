@@ -34,7 +34,8 @@ std::string label(const Backlash& b) {
 
 std::vector<Backlash> listed_differences(const TableBasis& basis, const Eigen::VectorXd& D,
                                          const Eigen::MatrixXd& covariance) {
-  constexpr double kOfPrior = 0.5;  // three quarters of the information are the data's
+  constexpr double kOfPrior = 0.5;  // limit of u / kUOfBacklash: three quarters of the information
+                                    // then come from the data
   const bool per_node = basis.travel() == TravelDependence::Tables;
   std::vector<Backlash> all;
   for (const Table& table : basis.layout().tables()) {
@@ -75,7 +76,7 @@ std::vector<Backlash> largest_of_tables(std::span<const Backlash> all) {
 }
 
 std::vector<std::string> notes_on(std::span<const Backlash> all) {
-  // Probability that noise alone exceeds it in one of 14 values: 1e-3.
+  // Noise alone exceeds four standard uncertainties in one of 14 values with a probability of 1e-3.
   constexpr double kSure = 4.0;
   std::string found, undetermined;
   for (const Backlash& b : largest_of_tables(all)) {

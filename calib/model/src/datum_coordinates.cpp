@@ -24,7 +24,7 @@ std::vector<DatumGroup> groups_of(const ParameterLayout& layout) {
   return groups;
 }
 
-/// Orthonormal basis of what the conditions on these parameters leave free.
+/// Orthonormal basis of the parameter changes that satisfy the conditions K U = 0.
 Eigen::MatrixXd free_of(const Eigen::MatrixXd& K) {
   std::vector<Eigen::Index> conditions;
   for (Eigen::Index i = 0; i < K.rows(); ++i) {

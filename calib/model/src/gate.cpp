@@ -159,7 +159,7 @@ struct ScaleDifference {
   double u = 0.0;  ///< upper bound: the errors at all points are assumed to be fully correlated
 };
 
-/// Scale of the candidate relative to the active model, inside both validity volumes.
+/// Difference of scale, candidate minus active model, inside both validity volumes.
 ScaleDifference scale_difference(const VolumetricModel& candidate, const VolumetricModel& active,
                                  const Vector3& t) {
   constexpr std::size_t kEnough = 1000;

@@ -118,7 +118,7 @@ std::array<double, 3> midpoint_error_of_cubic_m(const VolumetricModel& model) {
   return most;
 }
 
-/// Equidistant nodes over a box.
+/// A grid with equidistant nodes over a box.
 InterpolationGrid equidistant(const ReadingBox& box, const std::array<std::size_t, 3>& count) {
   InterpolationGrid grid;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -154,8 +154,8 @@ Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Inde
   return model.V_at(0.5 * (q + beside), t) - 0.5 * (model.V_at(q, t) + model.V_at(beside, t));
 }
 
-/// Interpolation errors halfway to the two neighbour nodes along an axis. At an end of the axis
-/// both are that of the one neighbour.
+/// Interpolation errors halfway to the two neighbour nodes along an axis. A node at an end of the
+/// axis has one neighbour; both values are then the error halfway to it.
 struct Misses {
   Vector3 before, after;
 };

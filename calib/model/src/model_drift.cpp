@@ -17,11 +17,12 @@
 namespace abbe::calib {
 namespace {
 
-/// The covariances have rounding of 1e-13 of their largest entries; columns of scaled matrices
-/// below this fraction are only rounding.
+/// Relative limit of rounding: the covariances have rounding errors of 1e-13 of their largest
+/// entries. A column of a scaled matrix that is smaller than this fraction consists of rounding
+/// errors.
 constexpr double kRoundingOfCovariance = 1e-10;
 
-/// Share of the false alarms that the tests with one degree of freedom may take.
+/// Share of the false-alarm probability for the tests with one degree of freedom.
 constexpr double kSmoothShare = 0.9;
 
 Result<void> not_comparable(std::string_view what) {
@@ -29,7 +30,7 @@ Result<void> not_comparable(std::string_view what) {
 }
 
 bool same_nodes(const AxisNodes& a, const AxisNodes& b) {
-  constexpr double kSame_m = 1e-9;  // files contain decimal numbers in mm
+  constexpr double kSame_m = 1e-9;  // larger than the rounding of decimal numbers in files (mm)
   const auto same = [](double x_m, double y_m) { return std::abs(x_m - y_m) < kSame_m; };
   return std::equal(a.nodes_m.begin(), a.nodes_m.end(), b.nodes_m.begin(), b.nodes_m.end(), same) &&
          same(a.reference_m, b.reference_m);
@@ -46,11 +47,12 @@ bool holds_for_tools_of(const VolumetricModel& a, const VolumetricModel& b) {
                      [&](const Vector3& t) { return a.holds_for_tool(t); });
 }
 
-/// The difference of two models in whitened coordinates: w ~ N(0, I) if nothing changed.
+/// The difference of two models in whitened coordinates: w ~ N(0, I) if the machine has not
+/// changed.
 struct WhitenedDifference {
   DatumCoordinates coordinates;
   Eigen::VectorXd w;
-  Eigen::MatrixXd W;  ///< change of w per coordinate
+  Eigen::MatrixXd W;  ///< change of w per unit of each coordinate
   std::size_t untested = 0;
 };
 
@@ -63,7 +65,7 @@ Result<WhitenedDifference> whitened_difference(const VolumetricModel& run,
       [](double variance) { return variance > 0.0 ? 1.0 / std::sqrt(variance) : 1.0; });
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * C *
                                                              scale.asDiagonal());
-  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+  const Eigen::VectorXd& values = eigen.eigenvalues();  // in ascending order
   const Eigen::Index n = values.size();
   const double least = kRoundingOfCovariance * (n > 0 ? values(n - 1) : 0.0);
   const auto first = std::upper_bound(values.data(), values.data() + n, least) - values.data();
@@ -81,7 +83,8 @@ Result<WhitenedDifference> whitened_difference(const VolumetricModel& run,
   return d;
 }
 
-/// Log of p and of its limit: p itself is 0 for large changes, which still have to be ordered.
+/// A test with the logarithm of its p. Large changes have p = 0 in double precision; the logarithm
+/// still orders them.
 struct Significance {
   ChiSquare test;
   double log_p = 0.0;
@@ -96,13 +99,14 @@ Significance significance(double statistic, std::size_t dof, double limit, bool 
   return {{statistic, dof, exponential(log_p), limit}, log_p, smooth};
 }
 
-/// Limits of the tests: their sum over all tests is the probability of a false alarm.
+/// Limits of p for a test of each kind. Their sum over all tests is the probability of a false
+/// alarm.
 struct Limits {
   double smooth = 0.0, any = 0.0;
 };
 
 Limits limits_of(const DatumCoordinates& c, double false_alarm) {
-  double smooth = 0.0, any = 1.0;  // all tables together
+  double smooth = 0.0, any = 1.0;  // any = 1: the test of all tables together
   for (const DatumGroup& group : c.groups) {
     smooth += group.size > 0 ? 1.0 : 0.0;
     any += group.size > 1 ? 1.0 : 0.0;
@@ -144,7 +148,7 @@ class Freed {
   Eigen::MatrixXd Q_;
 };
 
-/// What is left of the difference and of the columns of a table with other tables free.
+/// The difference w and the columns W of a table after the other free tables have been fitted.
 struct Projected {
   Eigen::VectorXd w;
   Eigen::MatrixXd W;
@@ -188,7 +192,7 @@ Significance most_significant(const WhitenedDifference& d, const DatumGroup& gro
   return any.excess() > smooth.excess() ? any : smooth;
 }
 
-/// Estimates the change of a table where it is largest.
+/// Estimates the change of a table at the position where it is largest.
 void estimate_change(TableChange& change, const WhitenedDifference& d, const DatumGroup& group,
                      const Freed& freed, const ParameterLayout& layout) {
   const Projected p(d, group, freed);
@@ -223,19 +227,21 @@ ChiSquare rest_test(const WhitenedDifference& d, const Freed& freed, double limi
   return significance(freed.without(d.w).squaredNorm(), dof, limit, false).test;
 }
 
-/// " by 4.2 um at 300 mm (u 0.5 um)"; `before_u` is written before the uncertainty.
+/// Text such as " by 4.2 um at 300 mm (u 0.5 um)". `before_u`: text before the value of the
+/// uncertainty.
 std::string size_of(const TableChange& c, std::string_view before_u) {
   constexpr double kMicro = 1e6, kMmPerM = 1e3;
   const char* unit = c.is_angle ? " urad" : " um";
   const std::string place = c.position_m ? message(" at ", kMmPerM * *c.position_m, " mm") : "";
-  // Three digits: more would pretend to a precision that neither value has.
+  // Three digits, because the values are not known more precisely.
   std::ostringstream out;
   out << std::setprecision(3) << " by " << kMicro * c.change << unit << place << " (" << before_u
       << kMicro * c.u << unit << ")";
   return out.str();
 }
 
-/// Takes the most significant table as changed, until no test exceeds its limit.
+/// Takes the table with the most significant test as changed and repeats the tests, until no test
+/// exceeds its limit.
 std::vector<bool> find_drifted(const WhitenedDifference& d, const ParameterLayout& layout,
                                const Limits& limits, std::vector<Significance>& found) {
   const std::vector<DatumGroup>& groups = d.coordinates.groups;

@@ -25,7 +25,7 @@ bool has_group(const DatumCoordinates& c, const std::string& table) {
 }
 
 Result<void> check_update_options(const UpdateOptions& o, const DatumCoordinates& c) {
-  // This form of the conditions refuses NaN.
+  // Written with a negation so that NaN is refused.
   if (!(o.forgetting > 0.0 && o.forgetting <= 1.0)) {
     return failure(ErrorCode::BadInput,
                    message("update: forgetting ", o.forgetting, " must be in (0, 1]"));
@@ -63,7 +63,8 @@ double process_noise(const DatumGroup& group, const UpdateOptions& o) {
   return std::sqrt(o.days) * (own == o.of_tables.end() ? of_all : own->per_root_day);
 }
 
-/// Q of one table: q^2 (I + s s^T), s: its smooth change; q^2 for squareness.
+/// Adds the process noise Q of each table: q^2 (I + s s^T), s: smooth change of the table. For
+/// squareness q^2.
 void add_process_noise(Eigen::MatrixXd& C, const DatumCoordinates& c, const ParameterLayout& layout,
                        const UpdateOptions& o) {
   for (const DatumGroup& group : c.groups) {
@@ -79,7 +80,7 @@ void add_process_noise(Eigen::MatrixXd& C, const DatumCoordinates& c, const Para
   }
 }
 
-/// The range offset of a model in the coordinates e; nullopt: not in common.
+/// The range offset of a model in the coordinates e; nullopt: the model does not share its offset.
 struct OffsetInCoordinates {
   const OffsetInModel* of_model = nullptr;
   Eigen::VectorXd g;  ///< N^T dU_dd
@@ -105,7 +106,7 @@ Result<void> check_offsets(const ModelWithOffset& previous, const ModelWithOffse
     return {};
   }
 
-  constexpr double kSame = 4.0;  // standard uncertainties of the difference
+  constexpr double kSame = 4.0;  // limit in standard uncertainties of the difference
   const OffsetInModel& before = *previous.range_offset;
   const std::optional<OffsetOfData> now = of_data(*run.range_offset);
   if (now &&
@@ -122,8 +123,8 @@ Result<void> check_offsets(const ModelWithOffset& previous, const ModelWithOffse
   return {};
 }
 
-/// Columns G: a relative error of all ranges changes all positioning tables with slope 1, one of
-/// the scale of an axis that of this axis.
+/// Columns of G (model_update.hpp). A relative error of all ranges changes all positioning tables
+/// by a line of slope 1; a relative error of the scale of one axis changes the table of this axis.
 Eigen::MatrixXd common_part(const DatumCoordinates& c, const ParameterLayout& layout,
                             const UpdateOptions& o) {
   const Eigen::MatrixX3d of_axis = axis_scale_columns(layout);
@@ -133,7 +134,7 @@ Eigen::MatrixXd common_part(const DatumCoordinates& c, const ParameterLayout& la
   return c.N.transpose() * G;
 }
 
-/// The unknowns of an update: the coordinates e, divided by `scale`, then d / d_scale.
+/// The adjustment of an update. Unknowns: the coordinates e, divided by `scale`, then d / d_scale.
 class Update {
  public:
   Update(Eigen::VectorXd scale, double d_scale_m)
@@ -169,7 +170,7 @@ class Update {
     return {};
   }
 
-  /// d = value with the standard uncertainty u.
+  /// Adds the observation d = value with the standard uncertainty u.
   void add_offset(double value_m, double u_m) {
     Eigen::MatrixXd row = Eigen::MatrixXd::Zero(1, scale_.size() + 1);
     row(0, scale_.size()) = d_scale_m_ / u_m;
@@ -177,8 +178,8 @@ class Update {
   }
 
   struct Solution {
-    Eigen::VectorXd x;     ///< e, then d
-    Eigen::MatrixXd root;  ///< of their covariance
+    Eigen::VectorXd x;     ///< coordinates e, then d
+    Eigen::MatrixXd root;  ///< root of their covariance
   };
   [[nodiscard]] Solution solve() const {
     const Eigen::Index n = scale_.size() + 1;
@@ -230,7 +231,8 @@ Result<ModelWithOffset> update_model(const ModelWithOffset& before, const ModelW
   const Eigen::MatrixXd& N = c.N;
   const Eigen::MatrixXd G = common_part(c, layout, options);
   const auto of_run = in_coordinates(now.range_offset, N);
-  // Without the run, the offset of the previous model is one of another place.
+  // If the run states no offset, the offset of the previous model belongs to another tracker place
+  // and is not used.
   const auto of_previous = of_run ? in_coordinates(before.range_offset, N) : std::nullopt;
   const auto given_common = [&](const VolumetricModel& model,
                                 const std::optional<OffsetInCoordinates>& offset) {

@@ -90,7 +90,8 @@ double mean_misfit_m2(const VolumetricModel& model, std::span<const Vector3> pla
 
 bool is_notable_misfit(const VolumetricModel& model) {
   constexpr int kPerAxis = 5;
-  constexpr double kLeast = 1.02 * 1.02 - 1.0;  // of the variance
+  constexpr double kLeast = 1.02 * 1.02 - 1.0;  // relative increase of the variance that makes u
+                                                // larger by 2 %
   std::vector<Vector3> places_m;
   for (int i = 0; i < kPerAxis * kPerAxis * kPerAxis; ++i) {
     const std::array at{i % kPerAxis, i / kPerAxis % kPerAxis, i / kPerAxis / kPerAxis};

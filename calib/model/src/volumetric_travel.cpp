@@ -31,8 +31,8 @@ Result<void> check_sizes(const TravelDifferences& d, const TableBasis& basis) {
   return {};
 }
 
-/// Covariance of tables and differences: without half the differences, which the covariance of the
-/// mean contains.
+/// Joint covariance of tables and differences. Half the differences, which the covariance of the
+/// mean contains, are subtracted.
 Eigen::MatrixXd whole_covariance(const VolumetricModel& model) {
   const TravelDifferences& d = *model.travel();
   const Eigen::MatrixXd half = half_differences(*model.travel_tables(), d.D);
@@ -83,7 +83,7 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
       {.q_m = axis_position_m, .tool_offset_m = lever_offset_m(tool_offset_m), .travel = travel});
   e.V_m += effect.V_m;
   e.cov_V_m2 += effect.cov_m2;
-  e.cov_V_m2.diagonal() = e.cov_V_m2.diagonal().cwiseMax(0.0);  // rounding
+  e.cov_V_m2.diagonal() = e.cov_V_m2.diagonal().cwiseMax(0.0);  // removes negative rounding errors
   return e;
 }
 

@@ -1,5 +1,4 @@
 #pragma once
-/// What each part contributes to a joint model (identify.hpp), as standard uncertainties.
 
 #include <optional>
 #include <span>
@@ -10,24 +9,25 @@
 
 namespace abbe::calib::joint {
 
-/// rms of the standard uncertainty of V over the nodes, rigid motion removed (as u_m of
-/// otf::correction_size). nullopt: the parts do not determine the tables.
+/// Contribution of one part to a joint model (identify.hpp), as rms of the standard uncertainty of
+/// V over the nodes, rigid motion removed (u_m of otf::correction_size). nullopt: the parts do not
+/// determine the tables.
 struct Contribution {
-  std::optional<double> u_alone_m;    ///< of the model of this part alone
-  std::optional<double> u_without_m;  ///< of the model of all other parts
+  std::optional<double> u_alone_m;    ///< for the model of this part alone
+  std::optional<double> u_without_m;  ///< for the model of all other parts
 };
-/// One per part, in their order.
+/// Returns one contribution per part, in the order of the parts.
 [[nodiscard]] Result<std::vector<Contribution>> contributions(std::span<const Part>,
                                                               const CommonTables&);
 
-/// Root mean square of the standard uncertainties of the nodes of a table; of a squareness error,
-/// its standard uncertainty. In datum G2 of the model.
+/// Uncertainty of a table in datum G2: root mean square of the standard uncertainties of its nodes.
+/// For a squareness error its standard uncertainty.
 struct TableUncertainty {
-  std::string table;      ///< "EXX", "EC0Y"
-  bool is_angle = false;  ///< rad, else m
+  std::string table;      ///< such as "EXX", "EC0Y"
+  bool is_angle = false;  ///< true: u in rad, false: in m
   double u = 0.0;
 };
-/// Of a model of tables, in the order of its parameters.
+/// Uncertainties of all tables and squareness errors of a model, in the order of its parameters.
 [[nodiscard]] std::vector<TableUncertainty> table_uncertainties(const VolumetricModel&);
 
 }  // namespace abbe::calib::joint

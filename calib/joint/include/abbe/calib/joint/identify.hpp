@@ -5,8 +5,8 @@
 /// The information is a sum, so the covariance of the result is never larger than that of a part
 /// alone (as matrices), and neither is the uncertainty of V at any position.
 ///
-/// Test of two parts i, j: how much larger is the minimum of both together than the sum of their
-/// own minima?
+/// Test of two parts i, j: X2 is the increase of the minimum of both together over the sum of their
+/// own minima.
 ///     X2 = min(i + j + priors of shared effects) - min(i) - min(j)
 /// X2 is chi-square with rank(i) + rank(j) + (shared effects) - rank(i + j) degrees of freedom if
 /// both describe one machine. It is the chi-square of the difference over all combinations of
@@ -21,23 +21,24 @@
 /// lengths (temperature, calibration, ranges of the tracker), the scale of X, Y, Z, and the three
 /// squareness errors. Part k observes e + a d, all other parts e (a: effect of the direction); d is
 /// estimated in the adjustment of all parts, with its standard uncertainty u and the degrees of
-/// freedom of u, and |d| / u is compared with the quantile of Student's t. Of two parts there is
-/// one such test for each direction, of n > 2 parts n: each part against all others, which also
-/// shows which part differs.
+/// freedom of u, and |d| / u is compared with the quantile of Student's t. Two parts have one such
+/// test for each direction. n > 2 parts have n tests, each part against all others, so that the
+/// tests also show which part differs.
 ///
 /// False alarms: the limits of all tests sum to JointOptions::false_alarm (Bonferroni): 70 % for
 /// the directed tests of the length, the most frequent mistake, 20 % for those of scales and
-/// squareness, a tenth for X2 of the pairs. With the default a length error of 5 u between two
-/// parts is found with a probability of 0.96.
+/// squareness, 10 % for X2 of the pairs. With the default a length error of 5 u between two parts
+/// is found with a probability of 0.96.
 ///
-/// Explanations of a contradiction: all that leave an X2 whose probability is larger than 1e-3 and
-/// than the limit of the test. First the one that fits best: that whose improvement of X2 is least
-/// likely to occur by chance (Explanation::log_p).
+/// Explanations of a contradiction are all hypotheses after which the probability of the remaining
+/// X2 is larger than 1e-3 and than the limit of the test. The first explanation is the best one:
+/// its improvement of X2 is least likely to occur by chance (Explanation::log_p).
 /// - mistakes without unknowns, at most three: the sign of a whole part or of one table, the unit
 ///   of a part, the mistakes of its method (axes reversed or swapped, tool);
 /// - a difference in one direction, the one that fits best;
-/// - tables that differ, at most three: each is the table that decreases X2 most significantly with
-///   those before it free, until the rest is likely.
+/// - tables that differ, at most three. Each further table is the one that decreases X2 most
+///   significantly, with the tables found before it free. The search ends when the remaining X2 is
+///   likely.
 /// Two parts alone do not show which of them is wrong.
 ///
 /// All functions are pure and may be called from any thread; Part::mistakes is called on the thread
@@ -54,58 +55,59 @@
 namespace abbe::calib::joint {
 
 struct JointOptions {
-  /// Probability that parts of one machine are refused. All tests together have at most this
-  /// probability (Bonferroni). 2e-3: 100 sound sets of parts without a refusal with a probability
-  /// of 0.82 or more.
+  /// Probability that parts of one unchanged machine are refused. All tests together have at most
+  /// this probability (Bonferroni). With 2e-3, 100 correct sets of parts are all accepted with a
+  /// probability of 0.82 or more.
   double false_alarm = 2e-3;
 };
 
 /// A table or squareness error in which two parts differ.
 struct TableDifference {
-  std::string table;  ///< "EXX", "EC0Y"
-  /// j minus i where it is largest, m or rad, with its standard uncertainty; the other tables
-  /// alike.
+  std::string table;  ///< such as "EXX", "EC0Y"
+  /// Value of part j minus part i at the position where it is largest, m or rad, with its standard
+  /// uncertainty. Estimated with all other tables equal in both parts.
   double difference = 0.0, u = 0.0;
-  std::optional<double> position_m{};  ///< on the axis; nullopt: squareness
+  std::optional<double> position_m{};  ///< position on the axis; nullopt: squareness
   bool is_angle = false;
-  ChiSquare test;  ///< by how much X2 decreases if this table may differ
+  ChiSquare test;  ///< test of the decrease of X2 if this table may differ
 };
-/// "EXX by 4.2 um at 300 mm (u 0.5 um)"
+/// Text such as "EXX by 4.2 um at 300 mm (u 0.5 um)".
 [[nodiscard]] std::string text(const TableDifference&);
 
-/// What makes two parts agree that contradict each other.
+/// A hypothesis under which two contradicting parts agree.
 struct Explanation {
   std::string text;
-  /// How likely the improvement occurs by chance: log of the tail of chi-square, with as many
-  /// degrees of freedom as unknowns; a mistake without unknowns counts as one.
+  /// Logarithm of the probability that the improvement occurs by chance: tail of chi-square with as
+  /// many degrees of freedom as unknowns. A mistake without unknowns counts as one unknown.
   double log_p = 0.0;
 };
 
 struct PairTest {
   std::size_t i = 0, j = 0;  ///< indices of the parts
-  ChiSquare all;             ///< statistic, degrees of freedom, p, limit
+  ChiSquare all;             ///< the test of X2
   bool contradiction = false;
-  /// Of a contradiction: mistakes, directions, tables, best first; else empty.
+  /// For a contradiction: mistakes, directions and tables that explain it, best first; else empty.
   std::vector<Explanation> explanations{};
-  std::vector<TableDifference> tables{};  ///< of a contradiction: the most significant, at most 3
+  std::vector<TableDifference> tables{};  ///< for a contradiction: the tables that differ most
+                                          ///< significantly, at most 3
 };
 
 inline constexpr const char* kLength = "length";  ///< DirectedTest::direction
 
-/// Does one part differ from all others in one direction?
+/// Test whether one part differs from all others in one direction.
 struct DirectedTest {
   std::size_t part = 0;   ///< index of the part
-  std::string direction;  ///< kLength, "scale of X", "EC0Y"
-  bool is_angle = false;  ///< rad, else relative
-  /// Part minus all others, with its standard uncertainty.
+  std::string direction;  ///< kLength, or such as "scale of X", "EC0Y"
+  bool is_angle = false;  ///< true: difference in rad, false: relative
+  /// Value of the part minus that of all others, with its standard uncertainty.
   double difference = 0.0, u = 0.0;
-  double dof = 0.0;  ///< of u; 0: all uncertainties were stated
+  double dof = 0.0;  ///< degrees of freedom of u; 0: all uncertainties were stated
   double p = 1.0, limit = 0.0;
   bool contradiction = false;
-  bool explains = false;  ///< all parts agree if this part may differ in this direction
+  bool explains = false;  ///< true if all parts agree when this part may differ in this direction
 };
-/// "array: its lengths are larger by 20.3 um/m (u 1.7 um/m, p 1e-12) than those of run: wrong
-/// length or temperature of the array, or wrong scale of the tracker's ranges"
+/// Text such as "array: its lengths are larger by 20.3 um/m (u 1.7 um/m, p 1e-12) than those of
+/// run: wrong length or temperature of the array, or wrong scale of the tracker's ranges".
 [[nodiscard]] std::string text(const DirectedTest&, std::span<const Part>);
 
 /// Tests all pairs. BadInput for fewer than two parts, names that repeat, parts with another
@@ -121,7 +123,7 @@ struct DirectedTest {
 
 struct EffectEstimate {
   std::string name;
-  double value = 0.0, u = 0.0;  ///< in units of its stated standard uncertainty
+  double value = 0.0, u = 0.0;  ///< multiples of the effect's stated standard uncertainty
 };
 
 struct JointModel {
@@ -130,19 +132,20 @@ struct JointModel {
   std::size_t rank = 0;
   double condition = 0.0;
 };
-/// The model of all parts, tested or not: the caller tests them before. RankDeficient if all parts
-/// together leave a combination undetermined; the text names parameters. BadInput as test_pairs(),
-/// for no part at all, and if the covered positions of all parts span no volume.
+/// Computes the model of all parts without testing them: the caller tests them before.
+/// RankDeficient if all parts together leave a combination undetermined; the text names parameters.
+/// BadInput as test_pairs(), for no part at all, and if the covered positions of all parts span no
+/// volume.
 [[nodiscard]] Result<JointModel> joint_model(std::span<const Part>, const CommonTables&);
 
 struct JointIdentification {
   std::vector<PairTest> pairs;
   std::vector<DirectedTest> directed;
-  /// nullopt if a test found a contradiction: parts are never averaged then.
+  /// nullopt if a test found a contradiction: contradicting parts are not combined.
   std::optional<JointModel> joint;
-  /// First the most significant directed test, if it explains all and fits better than any other
-  /// explanation; then each pair: "run 1 and array contradict each other: chi-square ..."; then the
-  /// most significant directed test, if it is not the first.
+  /// Texts in this order: the most significant directed test, if it explains all contradictions and
+  /// fits better than any other explanation; each contradicting pair ("run 1 and array contradict
+  /// each other: chi-square ..."); the most significant directed test, if it is not the first text.
   std::vector<std::string> contradictions;
 };
 /// Tests all pairs and directions, and computes the model if there is no contradiction. A

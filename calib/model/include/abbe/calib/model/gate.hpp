@@ -58,7 +58,8 @@ struct GateLimits {
   double max_scale_change = 20e-6;
   /// Required relative decrease of the held-out figure; 0: any decrease is sufficient.
   double min_improvement = 0.0;
-  bool accept_smaller_volume = false;  ///< smaller than that of the active model
+  bool accept_smaller_volume = false;  ///< accept a validity volume smaller than that of the active
+                                       ///< model
   bool accept_scale_change = false;    ///< accept a scale difference above max_scale_change
 };
 
@@ -76,16 +77,16 @@ inline constexpr std::string_view kScaleChange = "scale-change";
 [[nodiscard]] double kept_share(const ValidityVolume& before, const ValidityVolume& after,
                                 double rim = 0.0);
 
-/// Accepted only if `reasons` is empty.
+/// Result of the gate. A model is accepted only if `reasons` is empty.
 struct Verdict {
   bool accepted = false;
   std::vector<std::string> reasons;  ///< one sentence with numbers for each rule that is not met
   /// Machine-readable identifiers of `reasons`, one each in the same order: the name of a Cause of
   /// the method's lack_of_fit.hpp, or one of held-out, nowhere, size, slope, volume, scale-change,
-  /// growth, uncertainty, orientation, outliers, shape-only, damage,
-  /// bar-temperature, bar-temperature-change, beams.
+  /// growth, uncertainty, orientation, outliers, shape-only, damage, bar-temperature,
+  /// bar-temperature-change, beams.
   std::vector<std::string> causes;
-  std::vector<std::string> notes;  ///< further information, no reason to refuse
+  std::vector<std::string> notes;  ///< further information that does not refuse the model
   HeldOutFigures held_out;
   /// |V| of the candidate without rigid motion, at the points that decide() evaluates
   double max_error_m = 0.0;
@@ -96,8 +97,8 @@ struct Verdict {
   void refuse(std::string_view cause, std::string text, std::size_t before);
 };
 
-/// Applies these conditions to the candidate. Pure. `active` may be null. Points at which magnitude
-/// and gradient of V are evaluated:
+/// Applies the conditions of this header to the candidate. Pure. `active` may be null. Points at
+/// which magnitude and gradient of V are evaluated:
 /// - tables: the tensor grid of the nodes (V is linear between them along each axis),
 /// - polynomials: the vertices of the validity hull (each is a measured reading), the midpoints
 ///   between any two vertices, and the nodes inside the hull.

@@ -26,21 +26,21 @@ struct InterpolationGrid {
 ///   whole range.
 [[nodiscard]] InterpolationGrid interpolation_grid(const VolumetricModel&, std::size_t most_nodes);
 
-/// What linear interpolation misses of V in the cells around a node.
+/// Error of linear interpolation of V, V minus interpolated V, in the cells around a node.
 struct InterpolationError {
-  Vector3 mean_m = Vector3::Zero();     ///< its mean over these cells: V minus interpolated V
-  Matrix3 moment_m2 = Matrix3::Zero();  ///< its second moment about the mean, averaged over a cell
+  Vector3 mean_m = Vector3::Zero();     ///< mean of the error over these cells
+  Matrix3 moment_m2 = Matrix3::Zero();  ///< second moment of the error about the mean, averaged
+                                        ///< over a cell
 };
 
-/// The caller adds mean_m to V and moment_m2 to cov_V_m2 at node (i, j, k): of all values at the
-/// nodes, V + mean has the smallest mean square error between them. Along each axis the error is
-/// modelled as a parabola c p(x) between nodes, p = 1 halfway; c is the error halfway to a
-/// neighbour node. The averages over a cell are
+/// Computes the error at node (i, j, k). The caller adds mean_m to V and moment_m2 to cov_V_m2
+/// there: V + mean_m is the node value with the smallest mean square error between the nodes. Along
+/// each axis the error is modelled as a parabola c p(x) between nodes, p = 1 halfway; c is the
+/// error halfway to a neighbour node. The averages over a cell are
 ///     E[p] = 2/3,   E[(p - E[p])^2] = 4/45,   E[(p - E[p]) (p' - E[p'])] = 0   (p': another axis).
-/// mean_m contains the mean c of both neighbours. In moment_m2 the larger c counts, and the
-/// difference of the two.
-/// Linear tables of which nodes are omitted: mean_m is zero, because V at the nodes is the model
-/// itself, and moment_m2 is about zero with
+/// mean_m contains the mean c of both neighbours. moment_m2 contains the larger c, and the
+/// difference of both. For linear tables with omitted nodes mean_m is zero, because V at the nodes
+/// is the model itself. moment_m2 is then the moment about zero, with
 ///     E[p^2] = 8/15,   E[p p'] = 4/9.
 /// All zero if every_node. Pure.
 [[nodiscard]] InterpolationError interpolation_error(const VolumetricModel&,

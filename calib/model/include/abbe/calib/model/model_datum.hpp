@@ -48,23 +48,23 @@ enum class ModelDatum { G1, G2, Ball1Blocks, Ball1 };
   return "G1";
 }
 
-/// True for the datums of tables.
+/// True for the datums of models with tables (G1 and G2).
 [[nodiscard]] constexpr bool is_of_tables(ModelDatum datum) {
   return datum == ModelDatum::G1 || datum == ModelDatum::G2;
 }
 
 /// Matrix K of datums G1 and G2 for tables: one row per condition, `unknowns` columns. The columns
-/// behind those of the nodes are zero: squareness, differences between directions of travel,
-/// nuisances.
+/// after those of the nodes (squareness, differences between directions of travel, nuisances) are
+/// zero.
 [[nodiscard]] Eigen::MatrixXd datum_conditions(ModelDatum, const TableBasis&, std::size_t unknowns);
 /// Matrix K of datums G1 and G2 for linear tables: one row per condition, fit_size() columns. The
 /// last six columns belong to the rigid unknowns and are zero.
 [[nodiscard]] Eigen::MatrixXd datum_conditions(ModelDatum, const ParameterLayout&);
 
 /// Basis of the parameter combinations (columns, fit_size() rows) that measurements with the target
-/// offsets `targets_m` cannot determine, at whatever positions in the volume: the null space of the
-/// design matrix with all three components of V at all node positions. In this matrix the offset of
-/// each target except the first has an unknown constant.
+/// offsets `targets_m` cannot determine, wherever the measured positions are in the volume. It is
+/// the null space of the design matrix with all three components of V at all node positions. In
+/// this matrix the offset of each target except the first has an unknown constant.
 [[nodiscard]] Eigen::MatrixXd unobservable_combinations(const ParameterLayout&,
                                                         std::span<const Vector3> targets_m);
 

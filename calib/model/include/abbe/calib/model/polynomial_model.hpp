@@ -18,13 +18,14 @@ struct NamedCoefficient {
   std::string name;
   double value = 0.0;
   double u = 0.0;
-  std::string unit;  ///< "mm", "1", "mm^-1", "rad/mm" ...
+  std::string unit;  ///< such as "mm", "1", "mm^-1", "rad/mm"
 };
 
-/// Immutable value; all members may be called from any thread.
+/// Coefficients c of a scaled design with their covariance. Immutable; all members may be called
+/// from any thread.
 class PolynomialModel {
  public:
-  /// BadInput / NotFinite unless c and its covariance have the size of the design and the
+  /// Returns BadInput or NotFinite unless c and its covariance have the size of the design and the
   /// covariance is symmetric without a negative variance. c and covariance are stored unchanged:
   /// for V(Ball1) = 0 the caller applies zero_at() before.
   [[nodiscard]] static Result<PolynomialModel> of(ScaledDesign, const Vector3& ball1_m,
@@ -36,9 +37,10 @@ class PolynomialModel {
   [[nodiscard]] const Eigen::VectorXd& c_m() const { return c_m_; }
   [[nodiscard]] const Eigen::MatrixXd& covariance_m2() const { return covariance_m2_; }
 
-  /// No allocation.
+  /// V at a reading. Does not allocate.
   [[nodiscard]] Vector3 V_at(const Vector3& reading_m) const;
-  /// V and its covariance; takes well below a microsecond in an optimised build. No allocation.
+  /// V and its covariance at a reading. Takes well below a microsecond in an optimised build. Does
+  /// not allocate.
   void V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& cov_m2) const;
 
   /// The coefficients of the equivalent model (equivalent_model.hpp), in the order of its names.
@@ -59,7 +61,8 @@ class PolynomialModel {
   Eigen::MatrixXd covariance_m2_;
   std::vector<Entry> entries_;
   std::array<std::size_t, 4> first_{};  ///< index of each component's first entry, and the end
-  Eigen::MatrixXd entry_covariance_;    ///< between entries: blocks by component are contiguous
+  Eigen::MatrixXd entry_covariance_;    ///< covariance of the entries; blocks of one component are
+                                        ///< contiguous
 };
 
 /// Matrix T such that the model with the coefficients T c has V = 0 at the place: T subtracts the

@@ -13,8 +13,9 @@
 /// contains its effect on them.
 ///
 /// With backlash (travel_differences.hpp) V depends on the direction in which each axis last moved.
-/// Functions without this direction give the mean of both directions; the covariance contains half
-/// the difference, not its uncertainty. error_at() with all directions unknown contains both.
+/// Functions without an argument for this direction give the mean of both directions; their
+/// covariance contains half the difference, but not the uncertainty of the difference. error_at()
+/// with all directions Unknown contains both in its covariance.
 ///
 /// A model has one of two forms: tables with nodes (rigid-body model; linear or cubic between the
 /// nodes, with natural or not-a-knot ends), or polynomials without tables (equivalent model of a
@@ -43,8 +44,8 @@ namespace abbe::calib {
 struct VolumetricError {
   Vector3 V_m = Vector3::Zero();       ///< NaN if !tool_ok
   Matrix3 cov_V_m2 = Matrix3::Zero();  ///< k = 1, in the model's datum; NaN if !tool_ok
-  bool inside = false;                 ///< the axis position is in the validity volume
-  bool tool_ok = false;                ///< the model is valid for this tool offset
+  bool inside = false;                 ///< true if the axis position is in the validity volume
+  bool tool_ok = false;                ///< true if the model is valid for this tool offset
 };
 
 /// Checks that a covariance is square, finite, symmetric and, within rounding, positive
@@ -81,15 +82,18 @@ struct ModelDescription {
   /// If set, `parameters` are the coefficients of the scaled design [m]; nodes and basis are
   /// ignored.
   std::optional<PolynomialForm> polynomials{};
-  /// of the tables of all axes, between `nodes`
+  /// interpolation of the tables of all axes between `nodes`
   Interpolation interpolation = Interpolation::Linear;
-  /// Tables only. `covariance` contains half the differences (TravelDifferences).
+  /// Differences between the directions of travel, for tables only. `covariance` must contain half
+  /// of them (TravelDifferences).
   std::optional<TravelDifferences> travel{};
-  /// Misfit, in addition to `covariance`, which contains its effect on the parameters.
+  /// Misfit of the form of the model. It is not part of `covariance`, but its effect on the
+  /// parameters is.
   std::optional<Misfit> misfit{};
 };
 
-/// Immutable value; all member functions are const and may be called from any thread.
+/// A volumetric model in one of its forms. Immutable; all member functions may be called from any
+/// thread.
 class VolumetricModel {
  public:
   /// Largest difference between a tool offset and that of the model. The tables of a 14-table model
@@ -98,39 +102,43 @@ class VolumetricModel {
   /// difference the model is not valid.
   static constexpr double kToolTolerance_m = 0.5e-3;
 
-  /// BadInput or NotFinite if the parameters are wrong (unknown or repeated name, missing node,
-  /// wrong size); the text names the first wrong parameter.
+  /// Builds the model from its stored form. BadInput or NotFinite if the parameters are wrong
+  /// (unknown or repeated name, missing node, wrong size); the text names the first wrong
+  /// parameter.
   [[nodiscard]] static Result<VolumetricModel> from_description(ModelDescription);
-  /// `U`: the model_size() parameters of the layout; `covariance`: their covariance;
-  /// `interpolation`: of all tables.
+  /// Builds a model of tables. `U`: the model_size() parameters of the layout; `covariance`: their
+  /// covariance; `interpolation`: that of all tables.
   [[nodiscard]] static Result<VolumetricModel> from_vector(
       const ParameterLayout&, ModelDatum, std::span<const Vector3> tool_offsets_m,
       const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume,
       Interpolation interpolation = Interpolation::Linear);
-  /// The same with the tables of a basis, and their interpolation.
+  /// Builds a model with the tables of a basis and their interpolation.
   [[nodiscard]] static Result<VolumetricModel> from_vector(const TableBasis&, ModelDatum,
                                                            std::span<const Vector3> tool_offsets_m,
                                                            const Eigen::VectorXd& U,
                                                            const Eigen::MatrixXd& covariance,
                                                            ValidityVolume);
 
-  /// A polynomial model, valid for one tool. Datum Ball1 or Ball1Blocks.
+  /// Builds a polynomial model, valid for one tool. Datum Ball1 or Ball1Blocks.
   [[nodiscard]] static Result<VolumetricModel> from_polynomials(PolynomialModel, ModelDatum,
                                                                 const Vector3& tool_offset_m,
                                                                 ValidityVolume);
 
-  /// The same model with differences between the directions of travel; `covariance()` must contain
-  /// half of them: half_differences() times its transpose. BadInput for polynomials, wrong sizes,
-  /// or a covariance, with that of the tables, not positive semidefinite; NotFinite for NaN.
+  /// Returns the same model with differences between the directions of travel. `covariance()` must
+  /// already contain half of them: half_differences() times its transpose. BadInput for
+  /// polynomials, for wrong sizes, or if the covariance of tables and differences together is not
+  /// positive semidefinite; NotFinite for NaN.
   [[nodiscard]] Result<VolumetricModel> with_travel(TravelDifferences) const;
-  /// The same model with another misfit; none if Misfit::any() is false. BadInput for a wrong size
-  /// or a negative value, NotFinite for NaN.
+  /// Returns the same model with another misfit; without misfit if Misfit::any() is false. BadInput
+  /// for a wrong size or a negative value, NotFinite for NaN.
   [[nodiscard]] Result<VolumetricModel> with_misfit(Misfit) const;
 
-  /// V with its covariance. Takes about 1 us, 4 us for cubic tables. No allocation.
+  /// V with its covariance, mean of both directions of travel. Takes about 1 us, 4 us for cubic
+  /// tables. Does not allocate.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
                                          const Vector3& tool_offset_m) const;
-  /// V alone, about four times faster. NaN for a tool for which the model is not valid.
+  /// V alone, mean of both directions of travel; about four times faster than error_at(). NaN for a
+  /// tool for which the model is not valid.
   [[nodiscard]] Vector3 V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const;
   /// Solves c = -V(p + c) for the nominal position p, by iteration until c changes by less than
   /// 1e-9 m. NotApplicable for a tool for which the model is not valid. NotConverged after 50
@@ -140,9 +148,10 @@ class VolumetricModel {
                                                       const Vector3& tool_offset_m,
                                                       const AxisTravel& travel = {}) const;
 
-  /// The same for the direction in which each axis last moved. Where it is Unknown, V is the mean
-  /// of both directions, and the covariance contains half the difference and its uncertainty.
-  /// Without differences the direction has no effect. error_at() allocates with differences.
+  /// V and covariance for the direction in which each axis last moved. For an axis with Unknown
+  /// direction V is the mean of both directions, and the covariance contains half the difference
+  /// and its uncertainty. In a model without differences the direction has no effect. error_at()
+  /// allocates if the model has differences.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
                                          const Vector3& tool_offset_m, const AxisTravel&) const;
   [[nodiscard]] Vector3 V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m,
@@ -155,31 +164,32 @@ class VolumetricModel {
   /// would be more than 300,000 positions; polynomials: a grid over the bounding box of the
   /// validity volume. The nodes of any tables are in tables()->layout().
   [[nodiscard]] const MachineNodes& nodes() const { return nodes_; }
-  /// V is linear between nodes() along each axis.
+  /// True if V is linear between nodes() along each axis.
   [[nodiscard]] bool linear_between_nodes() const {
     return interpolation() == Interpolation::Linear;
   }
-  /// Of the tables; nullopt for a model of polynomials.
+  /// Interpolation of the tables; nullopt for a model of polynomials.
   [[nodiscard]] std::optional<Interpolation> interpolation() const {
     return tables() == nullptr ? std::nullopt
                                : std::optional(tables()->interpolation(Axis::X).kind());
   }
-  /// Null for a model of polynomials.
+  /// The tables; null for a model of polynomials.
   [[nodiscard]] const TableBasis* tables() const { return std::get_if<TableBasis>(&form_); }
   [[nodiscard]] const PolynomialModel* polynomials() const {
     return std::get_if<PolynomialModel>(&form_);
   }
-  /// Null if V does not depend on the direction of travel.
+  /// The differences between the directions of travel; null if V does not depend on the direction.
   [[nodiscard]] const TravelDifferences* travel() const {
     return travel_ ? &travel_->differences : nullptr;
   }
-  /// The tables with their dependence on travel; null without.
+  /// The tables with their dependence on the direction of travel; null if V does not depend on it.
   [[nodiscard]] const TableBasis* travel_tables() const {
     return travel_ ? &travel_->basis : nullptr;
   }
-  /// Null without misfit.
+  /// The misfit; null if the model has none.
   [[nodiscard]] const Misfit* misfit() const { return misfit_ ? &*misfit_ : nullptr; }
-  /// What the misfit adds to the covariance of V, for a tool for which the model is valid.
+  /// Part of the covariance of V that is caused by the misfit, for a tool for which the model is
+  /// valid.
   [[nodiscard]] Matrix3 misfit_cov_V_m2(const Vector3& axis_position_m,
                                         const Vector3& tool_offset_m) const;
   [[nodiscard]] ModelDatum datum() const { return datum_; }
@@ -210,7 +220,7 @@ class VolumetricModel {
   Vector3 tool_line_ = Vector3::Zero();  ///< unit vector; zero: the model is valid for one tool
   Eigen::VectorXd U_;
   Eigen::MatrixXd covariance_;
-  /// Cubic tables: U and covariance with the second derivatives (geometry/cell_form.hpp).
+  /// For cubic tables only: U and its covariance in the coordinates Z of geometry/cell_form.hpp.
   Eigen::VectorXd Z_;
   Eigen::MatrixXd cov_Z_;
   ValidityVolume validity_;

@@ -1,7 +1,7 @@
 #pragma once
-/// The rows of an Information that determine something. Where the data leave combinations
-/// undetermined, R has rows of rounding errors (1e-16 of the others), whose z contain residuals: in
-/// a sum with other data these would count as observations.
+/// Selects the rows of an Information that determine a combination of unknowns. If the data leave
+/// combinations undetermined, R also has rows of rounding errors (1e-16 of the other rows), whose z
+/// contain residuals. In a sum with other data these rows would count as observations.
 
 #include <Eigen/Core>
 #include <span>
@@ -12,7 +12,7 @@
 
 namespace abbe::calib::joint {
 
-/// |A x - z|^2 + rest, A: full row rank.
+/// Represents the sum of squares |A x - z|^2 + rest; A has full row rank.
 struct DeterminingRows {
   Eigen::MatrixXd A;
   Eigen::VectorXd z;
@@ -22,8 +22,9 @@ struct DeterminingRows {
 };
 [[nodiscard]] DeterminingRows determining_rows(const estimation::Information&);
 
-/// The information of a part about (e, `kept`), U = N e: effects that are not kept are eliminated
-/// with their prior N(0, 1). `kept` without a column in the part has zeros.
+/// Information of a part about (e, `kept`), U = N e. Effects that are not in `kept` are eliminated
+/// with their prior N(0, 1). An effect in `kept` that the part does not have gets a column of
+/// zeros.
 [[nodiscard]] DeterminingRows in_coordinates(const estimation::Information&,
                                              std::span<const std::string> effects,
                                              const Eigen::MatrixXd& N,

@@ -1,6 +1,4 @@
 #pragma once
-/// The rotations that tables of one target leave out, for a part with another tool
-/// (joint/part.hpp).
 
 #include <Eigen/Core>
 #include <vector>
@@ -9,23 +7,26 @@
 
 namespace abbe::calib::joint {
 
-/// One table per rotation that the common tables do not have, for the tool t + `further_m`.
+/// The rotations that the common tables of one tool t leave out (joint/part.hpp), for a part with
+/// the tool t + `further_m`. Each rotation has one table.
 class LeftOutRotations {
  public:
   LeftOutRotations(const CommonTables&, const Vector3& further_m);
 
   /// Number of nodes of all tables; 0 for the tool of the common tables.
   [[nodiscard]] std::size_t size() const { return size_; }
-  /// 3 x size(): effect on V at a reading.
+  /// Matrix (3 x size()): effect of the rotations on V at a reading.
   [[nodiscard]] Eigen::Matrix3Xd B(const Vector3& reading_m) const;
-  /// basis.size() x size(): effect on the parameters that the same tables have for the other tool,
-  /// in datum G2. DegenerateGeometry as estimation::Datum::transformation().
+  /// Matrix (basis.size() x size()): effect of the rotations on the parameters of the common tables
+  /// if these are determined with the other tool, in datum G2. DegenerateGeometry as
+  /// estimation::Datum::transformation().
   [[nodiscard]] Result<Eigen::MatrixXd> of_parameters() const;
 
  private:
   struct Rotation {
     std::size_t axis = 0, offset = 0, nodes = 0;
-    Vector3 displacement_m = Vector3::Zero();  ///< of the tool per rotation
+    Vector3 displacement_m = Vector3::Zero();  ///< displacement of the tool point per unit of
+                                               ///< rotation
   };
   const CommonTables& common_;
   std::vector<Rotation> rotations_;

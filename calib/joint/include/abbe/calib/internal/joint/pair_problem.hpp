@@ -1,5 +1,5 @@
 #pragma once
-/// The adjustment of two parts in the coordinates of the datum (joint/identify.hpp).
+/// The adjustment of two parts i and j in the coordinates e of the datum (joint/identify.hpp).
 
 #include <Eigen/Core>
 #include <string>
@@ -11,7 +11,8 @@
 
 namespace abbe::calib::joint {
 
-/// X2 of two parts, with its degrees of freedom.
+/// The statistic X2 of two parts (joint/identify.hpp), with its degrees of freedom and log of its
+/// probability.
 struct Disagreement {
   double statistic = 0.0, log_p = 0.0;
   std::size_t dof = 0;
@@ -23,22 +24,22 @@ class PairProblem {
 
   [[nodiscard]] const DeterminingRows& of_i() const { return i_; }
   [[nodiscard]] const DeterminingRows& of_j() const { return j_; }
-  /// The rows of another hypothesis about a part, in the same unknowns.
+  /// Rows for other information about a part (a hypothesis), in the unknowns of this problem.
   [[nodiscard]] DeterminingRows rows(const Part&, const estimation::Information&) const;
   [[nodiscard]] Disagreement disagreement() const { return disagreement(i_, j_); }
   [[nodiscard]] Disagreement disagreement(const DeterminingRows& i, const DeterminingRows& j) const;
 
-  /// The minimum of both together, with that of each part alone (DeterminingRows::rest): -2 times
-  /// the logarithm of the likelihood, except for a constant.
+  /// Minimum sum of squares of both parts together, including DeterminingRows::rest of each part.
+  /// It is -2 times the logarithm of the likelihood, except for a constant.
   [[nodiscard]] double squares(const DeterminingRows& i, const DeterminingRows& j) const;
 
-  /// The minimum if j observes e + `free` d with any d.
+  /// Result of the adjustment if part j observes e + `free` d, d being additional unknowns.
   struct Freed {
     Disagreement left;
-    double drop = 0.0;         ///< of X2
-    std::size_t drop_dof = 0;  ///< combinations of d that the parts determine
+    double drop = 0.0;         ///< decrease of X2
+    std::size_t drop_dof = 0;  ///< number of combinations of d that the parts determine
     Eigen::VectorXd d;
-    Eigen::MatrixXd root_cov_d;  ///< covariance = root root^T
+    Eigen::MatrixXd root_cov_d;  ///< covariance of d = root root^T
   };
   [[nodiscard]] Freed freed(const Eigen::MatrixXd& free) const;
 

@@ -10,9 +10,9 @@
 
 namespace abbe::calib {
 
-/// Largest permitted ratio of the standard uncertainty to the correction. One half: even if the
-/// error of the correction is twice its standard uncertainty, the residual error is not larger than
-/// the uncorrected error.
+/// Largest permitted ratio of the standard uncertainty of the correction to the correction, both
+/// rms. One half: even if the error of the correction is twice its standard uncertainty, the
+/// residual error is not larger than the uncorrected error.
 inline constexpr double kMostUncertainty = 0.5;
 
 /// Entry in Verdict::causes.
@@ -28,8 +28,8 @@ inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
   }
 }
 
-/// A sentence such as "the axes have backlash: it changes the model by 12 um rms, the uncertainty
-/// is 2 um".
+/// Appends the effect on the model to the text of a cause, such as "the axes have backlash: it
+/// changes the model by 12 um rms, the uncertainty is 2 um".
 inline std::string with_effect(const std::string& cause, double bias_m, double u_m) {
   if (std::isnan(bias_m)) {
     return cause;  // the effect on the model is not known

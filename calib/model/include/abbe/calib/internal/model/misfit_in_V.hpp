@@ -6,24 +6,24 @@
 
 namespace abbe::calib {
 
-/// Covariance of V that the misfit of the tables causes: sum of m_T^2 g_T g_T^T (misfit.hpp). m_T
-/// is linear between the nodes; beyond them it is that of the nearest node.
+/// Part of the covariance of V that is caused by the misfit of the tables: the sum of m_T^2 g_T
+/// g_T^T (misfit.hpp) over all tables T. m_T is linear between the nodes; beyond the end nodes it
+/// is that of the nearest node.
 [[nodiscard]] Matrix3 misfit_of_tables_m2(const Misfit&, const ParameterLayout&,
                                           const Vector3& axis_position_m,
                                           const Vector3& tool_offset_m);
 
-/// Mean over the axis positions of the variance of V (trace) that the misfit of the model causes,
-/// for its first tool offset.
+/// Part of the variance of V (trace) that is caused by the misfit of the model: mean over the axis
+/// positions, for the first tool offset.
 [[nodiscard]] double mean_misfit_m2(const VolumetricModel&, std::span<const Vector3> places_m);
 
-/// True if the misfit makes u of V larger by 2 % or more, on average over the volume between the
-/// nodes. A smaller one is of no use to anybody; it can be found where hundreds of legs repeat the
-/// second order of the transforms.
+/// True if the misfit makes the rms standard uncertainty of V larger by 2 % or more over the volume
+/// between the nodes. A smaller misfit has no practical effect. It can also be caused by the second
+/// order of the exact transforms, if hundreds of legs repeat it.
 [[nodiscard]] bool is_notable_misfit(const VolumetricModel&);
 
-/// The larger value of each: neither of two runs shows that the misfit of the other is not there.
-/// Null:
-/// no misfit. Both are of models with the same parameters.
+/// The larger value of each entry, because a run does not disprove the misfit that another run
+/// shows. Null: no misfit. Both must belong to models with the same parameters.
 [[nodiscard]] Misfit larger_misfit(const Misfit* a, const Misfit* b);
 
 }  // namespace abbe::calib

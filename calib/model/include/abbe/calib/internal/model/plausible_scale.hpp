@@ -10,7 +10,7 @@
 
 namespace abbe::calib {
 
-/// Scale error of V common to all directions.
+/// Relative length error of V that is common to all directions: s of V = s p + rigid motion.
 inline double common_scale_error(const VolumetricModel& model) {
   const std::vector<Vector3> at = tensor_grid(model.nodes());
   std::vector<Vector3> V_m;

@@ -7,7 +7,8 @@
 
 namespace abbe::calib {
 
-/// The tools for which a model is valid: any tool, tools on a line, or (line zero) one tool.
+/// The tools for which a model is valid. `any`: every tool; else the tools on the line with
+/// direction `line`, or one tool if `line` is zero.
 struct ToolSpan {
   bool any = false;
   Vector3 line = Vector3::Zero();

@@ -199,7 +199,7 @@ Eigen::MatrixXd AlternativeColumns::of_step(const Added& a) const {
   });
 }
 
-/// Separate columns for every position.
+/// Columns of an alternative that has its own coefficients at every position.
 Eigen::MatrixXd AlternativeColumns::by_position(Cause cause) const {
   const Eigen::Index count = columns_by_position(cause);
   return filled(count * std::ssize(o_.seen), [&](auto rows, std::size_t p, std::size_t i) {
@@ -215,8 +215,9 @@ Eigen::MatrixXd AlternativeColumns::by_position(Cause cause) const {
   });
 }
 
-/// The machine expands, shears and shifts at constant rates: V changes by t (G (p - p1) + v). t:
-/// time as fraction of the session, G: symmetric strain, p1: place of Ball1, v: translation.
+/// Columns of Cause::Drift. The machine expands, shears and shifts at constant rates: V changes by
+/// t (G (p - p1) + v). t: time as fraction of the session, G: symmetric strain, p1: place of Ball1,
+/// v: translation.
 Eigen::MatrixXd AlternativeColumns::of_drift() const {
   const std::array<std::pair<int, int>, 6> strains{
       {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};

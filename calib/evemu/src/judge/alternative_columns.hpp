@@ -41,7 +41,7 @@ class AlternativeColumns {
   double arm_m_ = 0.0;
 };
 
-/// ", position 3, ball 4" for an alternative at one place, else empty.
+/// Text such as ", position 3, ball 4" for an alternative at one place, else empty.
 [[nodiscard]] std::string where(const Added&, const Observations&);
 /// Message to the user. d: estimated coefficients of the alternative's columns [m].
 [[nodiscard]] std::string text_of(const Added&, const Eigen::VectorXd& d_m, const Observations&);

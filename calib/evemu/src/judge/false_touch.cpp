@@ -78,7 +78,8 @@ std::optional<WithoutOne> face_without(const std::vector<Vector3>& others, const
                     .squares_m2 = rms_m * rms_m * static_cast<double>(others.size())};
 }
 
-/// `radius_m`: the known radius; nullopt: unknown.
+/// Fits a ball to `others`. `radius_m`: the known radius; nullopt: the radius is an unknown of the
+/// fit.
 std::optional<WithoutOne> ball_without(const std::vector<Vector3>& others, const Vector3& left_out,
                                        const Vector3& centre_m, std::optional<double> radius_m) {
   if (radius_m) {

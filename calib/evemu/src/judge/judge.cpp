@@ -43,7 +43,7 @@ Eigen::VectorXd relative_to_ball1(const Observations& position,
   return V;
 }
 
-/// `watch` for a part of a computation: its progress 0 to 1 is reported as `low` to `high`.
+/// A Watch for one part of a computation: its progress 0 to 1 is reported as `low` to `high`.
 Watch part_of(const Watch& watch, double low, double high) {
   Watch part{.stopped = watch.stopped};
   if (watch.progress) {
@@ -110,7 +110,7 @@ constexpr double kCoveredByU = 1.25;
 
 /// True if the uncertainty of the model covers the effect of the alternative. False for NaN.
 bool is_covered(const Alternative& other, const CorrectionSize& size) {
-  if (other.cause == Cause::Scatter) {  // included in u as white noise
+  if (other.cause == Cause::Scatter) {  // u already includes the scatter as white noise
     const bool of_a_probe = other.bias_m <= std::sqrt(3.0) * kScatterOfProbes_m;
     return other.bias_m <= kMostUncertainty * size.V_m &&
            (of_a_probe || other.bias_m <= kScatterBesideU * size.u_m);
@@ -119,8 +119,8 @@ bool is_covered(const Alternative& other, const CorrectionSize& size) {
          root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
 }
 
-/// True for scatter and uncertainty, which are only consequences: every other cause enlarges the
-/// scatter of the touches and the uncertainty.
+/// True for the causes scatter, form and uncertainty, which are only consequences: every other
+/// cause increases the scatter of the touches and the uncertainty.
 bool is_consequence(std::string_view cause) {
   return cause == name(Cause::Scatter) || cause == name(Cause::Form) || cause == kUncertain;
 }

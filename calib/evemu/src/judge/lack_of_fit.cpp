@@ -47,7 +47,8 @@ double threshold(double family, double false_alarm = kFalseAlarm) {
   return natural_logarithm(kCauses * family / false_alarm);
 }
 
-/// A comparison that failed. The alternative may be true: the model is refused.
+/// The entry for a comparison that failed. The model is then refused, because the alternative may
+/// be true.
 Alternative not_compared(Cause cause, const std::string& place, const std::string& why) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   return {.cause = cause,

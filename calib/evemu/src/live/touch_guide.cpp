@@ -98,7 +98,7 @@ std::string TouchGuide::where() const {
   return message("position ", plan().positions[place_], ": ");
 }
 
-/// "ball 3 has 24 of 25 points"
+/// Text such as "ball 3 has 24 of 25 points".
 std::string TouchGuide::tally(std::size_t feature) const {
   return message(name(feature_at(feature)), " has ", site_->points(feature).size(), " of ",
                  points_of(feature), " points");

@@ -248,8 +248,8 @@ bool Site::is_sided(const fit::Plane& face) const {
   return (face.point - *ball1_m_).dot(face.normal) > 2.0 * options_.max_off_expected_m;
 }
 
-/// While several assumptions about the sides of the faces are left, a ball has a place only if they
-/// agree on it, as they do on Ball1.
+/// Centre of a ball. While several assumptions about the sides of the faces are possible, it is
+/// known only if all of them give the same place. For Ball1 they always do.
 std::optional<Vector3> Site::centre_m(std::size_t ball) const {
   if (ball == 0) return ball1_measured_ ? ball1_m_ : std::nullopt;
   if (candidates_.empty()) return std::nullopt;
@@ -260,8 +260,8 @@ std::optional<Vector3> Site::centre_m(std::size_t ball) const {
   return agree ? std::optional(first_m) : std::nullopt;
 }
 
-/// While several assumptions about the sides of the faces are left, a normal is known only if they
-/// agree on its side.
+/// Normal of a block. While several assumptions about the sides of the faces are possible, it is
+/// known only if all of them give the same side.
 std::optional<Vector3> Site::normal(std::size_t block) const {
   const auto plane = face(block);
   if (!plane || candidates_.empty()) return std::nullopt;

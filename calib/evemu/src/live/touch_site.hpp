@@ -39,10 +39,11 @@ class Site {
   /// infinity if no place is known.
   [[nodiscard]] double nearest_ball_m(const Vector3& p_m, std::size_t& ball) const;
 
-  /// Index of a ball, from 0. nullopt: the touches of this position leave its place open.
+  /// Centre of a ball; `ball`: index from 0. nullopt: the touches of this position do not determine
+  /// it yet.
   [[nodiscard]] std::optional<Vector3> centre_m(std::size_t ball) const;
-  /// The normal of the calibrator in machine coordinates; nullopt: the touches leave open to which
-  /// side the face points.
+  /// The calibrator's normal of a block in machine coordinates; nullopt: the touches do not
+  /// determine yet to which side the face points.
   [[nodiscard]] std::optional<Vector3> normal(std::size_t block) const;
   /// The plane of a touched face, with the normal away from Ball1; nullopt: too few points.
   [[nodiscard]] std::optional<fit::Plane> face(std::size_t block) const;
@@ -78,8 +79,8 @@ class Site {
   [[nodiscard]] std::vector<double> possible_sides(std::size_t block, const fit::Plane& face) const;
   void place_balls();
 
-  /// Places of all balls under the assumption that the faces point to these sides: 1, away from
-  /// Ball1; -1, towards it.
+  /// Places of all balls under an assumption about the sides to which the faces point. side = 1:
+  /// away from Ball1; -1: towards it.
   struct Candidate {
     std::array<double, 2> side{};
     std::vector<Vector3> centres_m;
@@ -91,8 +92,9 @@ class Site {
 
   const Calibrator& calibrator_;
   const GuideOptions& options_;
-  std::optional<Vector3> ball1_m_;  ///< of the previous position until Ball1 is touched at this one
-  bool ball1_measured_ = false;     ///< at this position
+  std::optional<Vector3> ball1_m_;  ///< until Ball1 is touched at this position, its place at the
+                                    ///< previous position
+  bool ball1_measured_ = false;     ///< Ball1 has been measured at this position
   std::array<std::optional<double>, 2> sides_;  ///< known from previous positions
   std::vector<std::vector<Vector3>> points_;    ///< by feature
   std::vector<bool> accepted_;                  ///< by feature; only balls are accepted

@@ -47,7 +47,8 @@ std::vector<AxisMistake> mistakes_of_errors() {
       {"all signs reversed (V = actual - nominal, in um)", -Matrix3::Identity()},
       {"errors in mm instead of um", 1e3 * Matrix3::Identity()},
       {"errors in mm instead of um and all signs reversed", -1e3 * Matrix3::Identity()}};
-  // Readings times f have the shape of readings + V / f, times f.
+  // Wrong readings (true = f * given): they have the shape of given readings + V / f, enlarged by
+  // f.
   for (const UnitMistake& mistake : unit_mistakes()) {
     all.push_back({mistake.text + " (readings)", Matrix3::Identity() / mistake.factor});
   }
@@ -62,8 +63,9 @@ std::vector<AxisMistake> mistakes_of_errors() {
 Result<void> check_one_shape(const Observations& o) {
   constexpr double kLeast_m = 1e-6;
   const double given_m = shape_scatter_m(o, Matrix3::Identity());
-  // Errors that do not fit the readings at all fit best if they are made small: no mistake. Nothing
-  // fits better than readings that are one shape already, for example nominal places.
+  // If errors do not fit the readings at all, every correction that makes them small fits better;
+  // this is no mistake in the errors. The result must therefore be better than the readings without
+  // errors. If the readings have one shape already (nominal places), no correction is found.
   const double without_m = shape_scatter_m(o, Matrix3::Zero());
   double best_m = kFarBetter * std::min(given_m, without_m);
   std::string text;

@@ -4,10 +4,10 @@
 
 namespace abbe::calib::evemu {
 
-/// BadInput if readings and errors describe an artefact of another shape at every position, but one
-/// shape once the errors are reversed, converted from mm, or have an axis reversed or two axes
-/// swapped. Noise of readings and V also makes the shapes scatter: a mistake is reported only if
-/// correcting it reduces the scatter to a third or less.
+/// Checks that ball centres (reading + V) have the same shape at all positions. BadInput if they do
+/// not, but do after a change of the errors: reversed, converted from mm, one axis reversed or two
+/// axes swapped. Noise of readings and V also makes the shapes scatter: a mistake is reported only
+/// if its correction reduces the scatter to a third or less.
 [[nodiscard]] Result<void> check_one_shape(const Observations&);
 
 }  // namespace abbe::calib::evemu

@@ -82,7 +82,7 @@ std::optional<FeatureResiduals> of_block(const TouchedArtefact& s, std::size_t b
   }
 
   finish(f, design);
-  // Slopes become a change of the normal: -(slope_x x + slope_y y).
+  // The slopes are converted to a change of the normal: -(slope_x x + slope_y y).
   Eigen::MatrixXd normal_change(3, n);
   for (Eigen::Index k = 0; k < n; ++k) {
     normal_change.col(k) = -(f.response(1, k) * x + f.response(2, k) * y);
@@ -161,7 +161,8 @@ Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f,
                          const Eigen::VectorXd& along_m) {
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));
   const TouchedArtefact& s = o.seen[f.seen];
-  const Vector3 change = (f.response * along_m).head<3>();  // of the ball centre or face normal
+  const Vector3 change = (f.response * along_m).head<3>();  // change of the ball centre or of the
+                                                            // face normal
   const auto balls = s.balls.size();
   Vector3 turn = Vector3::Zero();
 

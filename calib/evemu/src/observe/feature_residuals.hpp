@@ -1,6 +1,4 @@
 #pragma once
-/// Residuals of the touches of every ball and face to its fitted surface, after the V of a model is
-/// removed.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -12,19 +10,22 @@
 
 namespace abbe::calib::evemu {
 
-/// Residuals of the touches of one ball or face, with V removed.
+/// Residuals of the touches of one ball or face to its fitted surface, after the V of a model is
+/// removed.
 struct FeatureResiduals {
   std::size_t seen = 0;
   Feature feature = Feature::Ball;
-  std::size_t index = 0;  ///< of the ball or block, from 0
+  std::size_t index = 0;  ///< index of the ball or block, from 0
   std::vector<Vector3> points_m;
-  Vector3 centre_m = Vector3::Zero();  ///< of a ball
+  Vector3 centre_m = Vector3::Zero();  ///< centre of a ball
   double radius_m = 0.0;               ///< radius of a ball plus radius of the tip
-  Eigen::MatrixXd normals;             ///< outward at each touch, 3 columns
-  /// Unknowns x touches: effect of a touch's displacement along its normal on the fit.
+  Eigen::MatrixXd normals;             ///< outward normal at each touch, 3 columns
+  /// Matrix (unknowns x touches): effect of a touch's displacement along its normal on the unknowns
+  /// of the surface.
   Eigen::MatrixXd response;
-  Eigen::VectorXd r_m;   ///< residuals
-  Eigen::VectorXd free;  ///< share of a touch's displacement that its residual shows, 1 - leverage
+  Eigen::VectorXd r_m;   ///< residual of each touch, along the normal
+  Eigen::VectorXd free;  ///< 1 - leverage: share of a touch's displacement that appears in its
+                         ///< residual
   [[nodiscard]] double dof() const { return static_cast<double>(r_m.size() - response.rows()); }
 };
 
@@ -48,7 +49,7 @@ inline constexpr double kLeastFree = 0.05;
 /// touch, rms over the balls.
 [[nodiscard]] double centre_noise_m(const std::vector<FeatureResiduals>&, double sigma_m);
 
-/// "position 3, ball 4"
+/// Text such as "position 3, ball 4".
 [[nodiscard]] std::string place_of(const Observations&, const FeatureResiduals&);
 
 /// Effect on the observed errors of a displacement of the touches along their normals.

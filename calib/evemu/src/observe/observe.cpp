@@ -56,7 +56,8 @@ Calibrator at_the_machine(const Calibrator& c, const std::optional<Expansion>& e
   return expansion ? at_temperature(c, *expansion) : c;
 }
 
-/// Requires a calibrator that has passed check().
+/// Transform from the calibrator's frame to the uniform frame. Requires a calibrator that has
+/// passed check().
 RigidTransform pre_to_uniform(const Calibrator& c) {
   return inverse(*uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal));
 }

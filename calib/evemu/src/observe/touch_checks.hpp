@@ -10,10 +10,11 @@
 
 namespace abbe::calib::evemu {
 
-/// Message to the user; nullopt if no touch is wrong. A message is returned if one touch lies
-/// farther than `least_false_touch_m` from the surface through the other touches, and these lie ten
-/// times closer to that surface ("touch 3 of 25 lies 0.7 mm off ..."), or if touches lie farther
-/// than `max_off_surface_m` from the surface through all of them.
+/// Checks the touches of one feature. Returns a message to the user, or nullopt if no touch is
+/// wrong. A message is returned if one touch lies farther than `least_false_touch_m` from the
+/// surface through the other touches, and these lie ten times closer to that surface ("touch 3 of
+/// 25 lies 0.7 mm off ..."), or if touches lie farther than `max_off_surface_m` from the surface
+/// through all of them.
 [[nodiscard]] std::optional<std::string> wrong_touch_on_ball(std::span<const Vector3> points_m,
                                                              const ObserveOptions&);
 [[nodiscard]] std::optional<std::string> wrong_touch_on_face(std::span<const Vector3> points_m,

@@ -1,5 +1,4 @@
 #pragma once
-/// The touches of one position of the ball array, and the array as measured by them.
 
 #include <map>
 #include <span>
@@ -33,14 +32,14 @@ using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
   return failure(code, message("position ", position, ": ", what));
 }
 
-/// TooFewObservations if a position of 1 to ObserveOptions::positions has no touch; BadInput for
-/// another position number; NotFinite.
+/// Sorts the touches by position. TooFewObservations if a position of 1 to
+/// ObserveOptions::positions has no touch; BadInput for another position number; NotFinite.
 [[nodiscard]] Result<std::map<int, Touched>> by_position(std::span<const Touch>,
                                                          const ObserveOptions&);
 
-/// Spheres, planes and pose of a position. `at_machine`: the calibrator at the array's temperature;
-/// `T_uni_pre`: from the coordinates of the calibrator to the uniform frame. The text of BadInput
-/// names the feature that does not fit, and the mistake that would explain the misfit.
+/// Fits the spheres, planes and pose of a position. `at_machine`: the calibrator at the array's
+/// temperature; `T_uni_pre`: transform from the coordinates of the calibrator to the uniform frame.
+/// The text of BadInput names the feature that does not fit, and a mistake that would explain this.
 [[nodiscard]] Result<TouchedArtefact> see(int position, const Touched&,
                                           const Calibrator& at_machine,
                                           const RigidTransform& T_uni_pre, const ObserveOptions&);

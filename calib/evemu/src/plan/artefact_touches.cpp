@@ -17,8 +17,10 @@ constexpr std::size_t kLeastBallPoints = 5;
 constexpr std::size_t kLeastFacePoints = 4;
 constexpr double kRingUpper_rad = 45.0 * std::numbers::pi / 180.0;
 constexpr double kRingLower_rad = 80.0 * std::numbers::pi / 180.0;
-constexpr double kOuter = 1.6;                // distance from a ball's centre / that in contact
-constexpr double kCosOfFarthestAround = 0.5;  // 60 degrees: free straight path around a ball
+constexpr double kOuter = 1.6;                // distance of the tip from a ball's centre / that in
+                                              // contact
+constexpr double kCosOfFarthestAround = 0.5;  // 60 degrees: largest angle of a free straight path
+                                              // around a ball
 
 Vector3 across(const Vector3& up) {
   return up.unitOrthogonal();
@@ -142,7 +144,9 @@ class Planner {
   /// features.
   [[nodiscard]] std::vector<Vector3> over_to(const Vector3& place_m) const {
     std::vector<Vector3> way;
-    if (!planned_.empty()) way.push_back(here_);  // back from the contact of the last touch
+    if (!planned_.empty())
+      way.push_back(here_);  // back from the contact of the last touch to its
+                             // approach point
     if (!high(here_)) way.push_back(raised(here_));
     way.push_back(raised(place_m));
     way.push_back(place_m);

@@ -7,7 +7,7 @@ namespace abbe::calib::evemu {
 
 std::optional<BallOfRadius> fit_ball_of_radius(std::span<const Vector3> points_m, double radius_m,
                                                const Vector3& start_m) {
-  constexpr int kIterations = 20;  // quadratic convergence from a start within mm
+  constexpr int kIterations = 20;  // enough: convergence is quadratic from a start within some mm
   constexpr double kSettled = 1e-12;
   BallOfRadius ball{.centre_m = start_m};
   Eigen::MatrixX3d J(std::ssize(points_m), 3);

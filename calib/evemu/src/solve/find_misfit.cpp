@@ -8,7 +8,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Mean distance of neighbouring balls: nothing is known about shorter distances.
+/// Mean distance of neighbouring balls. The array contains no information about shorter distances.
 double distance_of_balls_m(const Observations& o) {
   double sum_m = 0.0, count = 0.0;
   for (const BallError& a : o.rows) {
@@ -38,8 +38,8 @@ double variance_of_array_m2(const Observations& o) {
   return sum_m2 / static_cast<double>(o.artefact->u_ball_m.size());
 }
 
-/// Largest value, with a probability of 3e-5 to exceed it, of a variance that is estimated with
-/// these degrees of freedom.
+/// Upper limit of a variance that is estimated with `dof` degrees of freedom; exceeded with a
+/// probability of 3e-5.
 double largest_by_chance(double variance, double dof) {
   constexpr double kDeviations = 4.0;
   return variance * (1.0 + kDeviations * std::sqrt(2.0 / std::max(1.0, dof)));

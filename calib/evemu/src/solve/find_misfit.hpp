@@ -1,6 +1,4 @@
 #pragma once
-/// Misfit of a ball array (abbe/calib/model/misfit.hpp), found from the scatter of the ball
-/// centres.
 
 #include <optional>
 
@@ -10,13 +8,13 @@
 
 namespace abbe::calib::evemu {
 
-/// Scatter of the ball centres about the model beyond what explains it:
+/// Scatter of the ball centres about the model that is not explained by touches and array:
 ///     u_V^2 = s^2 - s_centre^2 - u_array^2
 /// s: noise of a ball centre per coordinate (Statistics::s_m), s_centre: noise that follows from
 /// the residuals of the touches to their balls, u_array: rms of the standard uncertainties of the
-/// balls' places in the array. Polynomials of low degree follow neither the pitch of a screw nor
-/// the shape of a guideway; touches do not tell it from an array that is not rigid or from slow
-/// noise. nullopt if chance explains the excess, or without touches.
+/// balls' places in the array. Possible reasons are errors that polynomials of low degree cannot
+/// represent (pitch of a screw, shape of a guideway), an array that is not rigid, and slow noise;
+/// touches cannot distinguish them. nullopt if the excess may be due to chance, or without touches.
 [[nodiscard]] std::optional<Misfit> find_misfit(const Observations&, const VolumetricModel&,
                                                 const Statistics&);
 

@@ -34,7 +34,7 @@ LinearGaussian gaussian_of(const FitProblem& problem) {
   return {white_rows(o, problem.X), white_rows(o, pose_rotation_rows(o)), white_rows(o, problem.y)};
 }
 
-/// The same, with the errors of the array.
+/// As gaussian_of(), with the columns of the errors of the array.
 LinearGaussian gaussian_with_array(const FitProblem& problem) {
   const Observations& o = problem.observations;
   return {white_rows(o, problem.X), white_rows(o, pose_rotation_rows(o)), white_rows(o, problem.A),

@@ -154,7 +154,7 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
                           of_poses = draw(S.cols());  // drawn in this order by every compiler
     Eigen::VectorXd scatter = coloured(o, noise.s_m * of_rows) + S * (noise.w_rad * of_poses);
     if (problem.A.cols() > 0) {
-      scatter += problem.A * draw(problem.A.cols());  // one array for all positions of a run
+      scatter += problem.A * draw(problem.A.cols());  // a run has the same array at all positions
     }
     const auto refit = path_to({r.X, fitted_mm + kMmPerM * scatter}, options, choice);
     ABBE_TRY(refit);

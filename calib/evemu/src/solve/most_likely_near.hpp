@@ -1,6 +1,4 @@
 #pragma once
-/// Hyper-parameters of the largest marginal likelihood with columns added to the design, searched
-/// from a starting point near the solution.
 
 #include <Eigen/Core>
 #include <span>
@@ -9,7 +7,8 @@
 
 namespace abbe::calib::evemu {
 
-/// As most_likely() for bayes-pose, from one starting point.
+/// Hyper-parameters of the largest marginal likelihood with columns added to the design. As
+/// most_likely() for bayes-pose, but searched from one starting point near the solution.
 [[nodiscard]] Result<HyperParameters> most_likely_near(const HyperParameters& start,
                                                        const ScaledDesign&, std::size_t positions,
                                                        const LinearGaussian& problem,

@@ -1,5 +1,4 @@
 #pragma once
-/// The norm that compares models of a ball array with each other and with their uncertainty.
 
 #include "abbe/calib/evemu/observe/observe.hpp"
 #include "abbe/calib/geometry/scaled_design.hpp"
@@ -7,7 +6,8 @@
 
 namespace abbe::calib::evemu {
 
-/// Root mean square of V over the readings of all balls at all positions, without rigid motion, for
+/// Norm for comparing models of a ball array with each other and with their uncertainty. It is the
+/// root mean square of V over the readings of all balls at all positions, without rigid motion, for
 /// a V given by coefficients of the design.
 [[nodiscard]] RigidFreeNorm norm_over_balls(const Observations&, const ScaledDesign&);
 

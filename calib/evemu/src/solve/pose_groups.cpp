@@ -44,7 +44,7 @@ std::vector<Vector3> corrected_m(const Observations& o, const PositionRows& p,
   return corrected;
 }
 
-/// y, L and the columns of the model.
+/// Fills y, L and the model's columns of a group.
 void fill_pose_group(estimation::ObservationGroup& group, const Observations& o,
                      const PositionRows& p, const RigidTransform& pose,
                      const VolumetricDesign& design) {

@@ -13,7 +13,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Logarithms of s_d, rho, s_a, s, w.
+/// Natural logarithms of the hyper-parameters s_d, rho, s_a, s, w (prior.hpp).
 using Theta = Eigen::Matrix<double, 5, 1>;
 using Theta5x5 = Eigen::Matrix<double, 5, 5>;
 constexpr Eigen::Index kSd = 0, kRho = 1, kSa = 2, kS = 3, kW = 4;
@@ -85,7 +85,7 @@ Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& d
   return d;
 }
 
-/// Minus log likelihood, with gradient.
+/// Function to be minimised: minus log likelihood, with gradient.
 struct Objective {
   PriorKind kind;
   const ScaledDesign& design;

@@ -24,8 +24,9 @@ struct RunRows {
   HyperParameters hyper;
   RigidFreeNorm norm;
 };
-/// The hyper-parameters are those of `solution` if it is bayes-pose without slow noise, else they
-/// are estimated: NotConverged if no starting point has a likelihood.
+/// Makes the rows. The hyper-parameters are those of `solution` if it is bayes-pose without slow
+/// noise; otherwise they are estimated. NotConverged if the likelihood cannot be computed at any
+/// starting point.
 [[nodiscard]] Result<RunRows> run_rows(const Observations&, const ScaledDesign&, const Solution&);
 
 /// Estimate with added columns. The columns of the array's own uncertainty are always added.
@@ -34,9 +35,9 @@ struct Refit {
   Eigen::VectorXd c_m, d_m;       ///< coefficients of the design, and of the added columns
   Eigen::MatrixXd covariance_m2;  ///< of the coefficients c_m
 };
-/// `X`: whitened rows of `design`; `C`: whitened columns added to them, with the prior standard
-/// deviation `size_m`. NotConverged if there is no likelihood near the hyper-parameters of the run,
-/// or no finite solution.
+/// Repeats the estimate. `X`: whitened rows of `design`; `C`: whitened columns added to them, with
+/// the prior standard deviation `size_m`. NotConverged if there is no likelihood near the
+/// hyper-parameters of the run, or no finite solution.
 [[nodiscard]] Result<Refit> refit(const RunRows&, const ScaledDesign& design,
                                   const Eigen::MatrixXd& X, const Eigen::MatrixXd& C,
                                   double size_m);

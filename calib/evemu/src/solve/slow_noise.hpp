@@ -1,6 +1,4 @@
 #pragma once
-/// Estimate of slow noise relative to the noise of a ball centre, by the marginal likelihood
-/// (noise.hpp, prior.hpp).
 
 #include <string>
 
@@ -15,7 +13,7 @@ namespace abbe::calib::evemu {
 inline constexpr double kLeastSlowNoiseGain = 2.0;
 
 struct SlowNoise {
-  double per_s = 0.0;           ///< Observations::slow_noise
+  double per_s = 0.0;           ///< value for Observations::slow_noise
   double log_likelihood = 0.0;  ///< natural logarithm of the likelihood ratio to no slow noise
 };
 /// The most likely slow noise, searched from 0.35 to 45 times s (per_s), or 0. `start`:

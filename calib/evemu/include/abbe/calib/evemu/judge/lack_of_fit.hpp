@@ -1,6 +1,6 @@
 #pragma once
-/// What the residuals of a ball array show beyond noise. The estimate is compared with
-/// alternatives. Most alternatives add a few columns C:
+/// Searches the residuals of a ball array for effects that are not noise. The estimate is compared
+/// with alternatives. Most alternatives add a few columns C:
 ///     y = X c + S omega + C d + noise,    d ~ N(0, t^2),  t from 10 to 300 um,
 /// y: observed errors, X c: the model, S omega: random rotations of the array at each position.
 /// With them an alternative describes a ball displaced at one position or wrong in the calibrator
@@ -34,8 +34,8 @@ enum class Cause {
   Bent,        ///< the array is bent differently at every position
   Drift,       ///< the machine drifts during the session
   ChainOrder,  ///< the order of the axes is not that of the configured chain
-  Order,       ///< polynomials of one order more
-  SlowNoise,   ///< slow noise within positions
+  Order,       ///< polynomials of one order more describe the errors better
+  SlowNoise,   ///< touches that follow each other have common noise
   Scatter      ///< more scatter than touches and array explain, without any other cause
 };
 [[nodiscard]] std::string_view name(Cause);
@@ -62,7 +62,8 @@ enum class Comparison { Made, Failed, Impossible };
 struct Alternative {
   Cause cause;
   std::string
-      text;  ///< what happened, where, how much, what to do; or what was not compared and why
+      text;  ///< description: what happened, where, how much, what to do; or what was not compared
+             ///< and why
   double log_likelihood = 0.0;  ///< natural logarithm of the likelihood ratio to the model alone
   double bias_m = 0.0;  ///< rms change of V by the alternative over the balls, rigid motion removed
   double u_m = 0.0;     ///< rms u of V if the alternative is true, rigid motion removed
@@ -80,14 +81,14 @@ struct CorrectionSize {
 /// Callbacks of a long computation; both may be empty.
 struct Watch {
   std::function<void(double fraction)>
-      progress;  ///< called in the calling thread, ascending up to 1
+      progress;  ///< called in the calling thread, with ascending values up to 1
   /// Called in the calling thread between two alternatives or fits. If it returns true, the
   /// computation ends with NotConverged.
   std::function<bool()> stopped;
 };
 
-/// The significant alternatives, the most likely first: family-wise error probability 1e-4, and
-/// 1e-2 for alternatives that change the model by more than twice its uncertainty. Alternatives
+/// Returns the significant alternatives, the most likely first: family-wise error probability 1e-4,
+/// and 1e-2 for alternatives that change the model by more than twice its uncertainty. Alternatives
 /// that change the model by less than a tenth of its uncertainty come after the others. At most one
 /// alternative of each cause is returned; of Scatter up to two, after the others. The comparisons
 /// that were not made come last. Only the columns of one alternative at a time are in memory.

@@ -2,12 +2,12 @@
 /// Determines which ball or block of the array is being touched, what is to be touched next, and
 /// which touches are wrong. [Li OMM] section 3: at every position Ball1, Block1, Block2, then Ball2
 /// to the last; the artefact is turned about Ball1 between positions. Only the coordinates of the
-/// touches are used, no time and no operator command: a touch is assigned to the feature that must
-/// be at its place. Ball1 stays in place. Ball1 and the two faces determine the place of every
-/// other ball (on which side of the faces the balls lie follows from the first completed balls and
-/// is known at later positions). A missed, repeated or wrong touch is therefore detected and
-/// reported, the touches acquired before are kept, and missing points are requested again. Lengths
-/// in m, machine coordinates. Allocates, so not for a real-time thread; not thread-safe.
+/// touches are used, no time and no operator command: the guide assigns a touch to the feature that
+/// it expects at this place. Ball1 stays in place. Ball1 and the two faces determine the place of
+/// every other ball (on which side of the faces the balls lie follows from the first completed
+/// balls and is known at later positions). A missed, repeated or wrong touch is therefore detected
+/// and reported, the touches acquired before are kept, and missing points are requested again.
+/// Lengths in m, machine coordinates. Allocates, so not for a real-time thread; not thread-safe.
 
 #include <cstddef>
 #include <memory>
@@ -22,7 +22,8 @@ namespace abbe::calib::evemu {
 
 struct TouchPlan {
   std::vector<int> positions{4, 8, 3, 7,
-                             2, 6, 1, 5};  ///< in the order they are touched; 1 .. n, each once
+                             2, 6, 1, 5};  ///< position numbers 1 .. n in the order in which they
+                                           ///< are touched
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
 };
@@ -45,7 +46,7 @@ struct TouchedFeature {
   int number = 1;
   friend bool operator==(const TouchedFeature&, const TouchedFeature&) = default;
 };
-[[nodiscard]] std::string name(const TouchedFeature&);  ///< "ball 3", "block 1"
+[[nodiscard]] std::string name(const TouchedFeature&);  ///< such as "ball 3", "block 1"
 
 struct NextTouch {
   int position = 0;
@@ -60,12 +61,11 @@ struct FeatureProgress {
   TouchedFeature on;
   std::size_t touched = 0;  ///< points taken
   std::size_t points = 0;   ///< points planned
-  /// In machine coordinates: the centre of a ball, the centroid of the points on a face. nullopt:
-  /// the touches of this position do not determine it yet.
+  /// Place in machine coordinates: the centre of a ball, or the centroid of the points on a face.
+  /// nullopt: the touches of this position do not determine it yet.
   std::optional<Vector3> at_m{};
-  /// Of the face of a block, in machine coordinates, to the side that the calibrator states.
-  /// nullopt:
-  /// the touches do not determine this side yet.
+  /// Normal of the face of a block, in machine coordinates, to the side that the calibrator states.
+  /// nullopt: the touches do not determine this side yet.
   std::optional<Vector3> normal{};
 };
 
@@ -83,20 +83,21 @@ class Site;
 
 class TouchGuide {
  public:
-  /// Errors of check(); BadInput for an invalid plan.
+  /// Creates a guide. Returns the errors of check(), and BadInput for an invalid plan.
   [[nodiscard]] static Result<TouchGuide> create(Calibrator, TouchPlan, GuideOptions = {});
   TouchGuide(TouchGuide&&) noexcept;
   TouchGuide& operator=(TouchGuide&&) noexcept;
   ~TouchGuide();
 
-  /// `p_m`: the tip's centre at a touch. Once complete() or after a failure(), no touch is taken.
+  /// Assigns a touch to a feature. `p_m`: centre of the tip at the touch. Once complete() or after
+  /// a failure(), no touch is taken.
   [[nodiscard]] GuidedTouch take(const Vector3& p_m);
 
   [[nodiscard]] bool complete() const { return place_ == plan().positions.size(); }
-  /// Why calibration is impossible: the calibrator describes another artefact, or the touches do
-  /// not follow the plan. nullopt: no failure.
+  /// The reason why the calibration cannot continue: the calibrator describes another artefact, or
+  /// the touches do not follow the plan. nullopt: no failure.
   [[nodiscard]] const std::optional<Error>& failure() const { return failure_; }
-  /// Must not be called once complete().
+  /// The touch that is expected next. Must not be called once complete().
   [[nodiscard]] NextTouch next() const;
   /// The features at the current position in measuring order. Must not be called once complete().
   [[nodiscard]] std::vector<FeatureProgress> features() const;
@@ -133,11 +134,13 @@ class TouchGuide {
   std::unique_ptr<Site> site_;
   std::size_t place_ = 0;
   std::size_t feature_ = 0;   ///< index of the expected feature, in measuring order
-  std::vector<bool> passed_;  ///< by feature: later features were touched before it had all points
+  std::vector<bool> passed_;  ///< by feature; true: later features were touched before this feature
+                              ///< had all points
   std::vector<Touch> finished_;
   std::vector<Matrix3> seen_;  ///< orientations of the artefact at the finished positions
   std::size_t astray_in_a_row_ = 0;
-  std::size_t discarded_in_a_row_ = 0;  ///< whole features or positions
+  std::size_t discarded_in_a_row_ = 0;  ///< number of whole features or positions discarded in
+                                        ///< succession
   std::optional<Error> failure_;
 };
 

@@ -1,10 +1,10 @@
 #pragma once
-/// Stage one: from touches of the ball array at several positions to errors of the ball centres. V
-/// at a ball = ideal centre (artefact.hpp) - measured centre, minus the same difference of Ball1;
-/// it belongs to the scale reading at the measured centre. The machine touches blocks and balls
-/// with its own errors. These errors rotate the whole artefact at position p by Theta_p, and
-/// displace the centre of a fitted sphere by D, which differs from V at the centre (a curved V
-/// deforms the sphere):
+/// Stage one: computes errors of the ball centres from touches of the ball array at several
+/// positions. V at a ball = ideal centre (artefact.hpp) - measured centre, minus the same
+/// difference for Ball1. This V belongs to the scale reading at the measured centre. The machine
+/// touches blocks and balls with its own errors. These errors rotate the whole artefact at position
+/// p by Theta_p, and displace the centre of a fitted sphere by D, which differs from V at the
+/// centre (a curved V deforms the sphere):
 ///     V_seen(ball i) = D_i(V) - D_1(V) - Theta_p(V) x (P_i - P_1)
 /// D and Theta are linear in V at the touched points. A rotation common to all positions cancels:
 /// touches cannot detect it ([Li OMM] does not mention this). If the touched points are available,
@@ -72,7 +72,8 @@ struct ObserveOptions {
   /// Smallest ratio of thinnest to largest extent of all balls. Below it the array covers only a
   /// plane, and the errors in the third direction are not measured.
   double least_thickness = 1e-3;
-  /// Required if the calibrator states the thermal expansion of the array, and only then.
+  /// Temperature of the array. Required if the calibrator states the thermal expansion of the
+  /// array; must be absent otherwise.
   std::optional<ArtefactTemperature> artefact_temperature{};
 };
 
@@ -95,10 +96,10 @@ struct Observations {
   [[nodiscard]] std::size_t positions() const;
 };
 
-/// Observations from touches. An error text names the position and the number of the feature.
-/// TooFewObservations: too few points on a ball or block; a ball, block or position left out.
-/// BadInput: a ball touched under two numbers; blocks swapped; a false touch; balls touched from
-/// below; the calibrator of another artefact, or balls numbered differently; Ball1 moved; an
+/// Computes the observations from touches. An error text names the position and the number of the
+/// feature. TooFewObservations: too few points on a ball or block; a ball, block or position left
+/// out. BadInput: a ball touched under two numbers; blocks swapped; a false touch; balls touched
+/// from below; the calibrator of another artefact, or balls numbered differently; Ball1 moved; an
 /// artefact that was not turned between positions; a temperature without an expansivity, or an
 /// expansivity without a temperature. DegenerateGeometry: all balls in one plane. If the balls fit
 /// when they are mirrored, renumbered or in another unit, the error text states that. With

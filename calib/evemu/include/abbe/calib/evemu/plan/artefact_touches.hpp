@@ -34,11 +34,12 @@ struct PlannedTouch : MachineTouch {
 
 struct ArtefactPlan {
   std::vector<PlannedTouch> touches;
-  std::vector<Vector3> leave_m;  ///< after the last touch: off the surface, then above all features
+  std::vector<Vector3> leave_m;  ///< path after the last touch: off the surface, then above all
+                                 ///< features
 };
 
-/// `from_m`: initial position of the tip's centre. Up is the outward normal of block 1. BadInput:
-/// too few points, or a ball above the tip; also the errors of check(nominal).
+/// Plans the touches. `from_m`: initial position of the tip's centre. Up is the outward normal of
+/// block 1. BadInput: too few points, or a ball above the tip; also the errors of check(nominal).
 [[nodiscard]] Result<ArtefactPlan> plan_artefact_touches(const Calibrator& nominal,
                                                          const std::array<FaceToTouch, 2>& faces,
                                                          const Vector3& from_m,

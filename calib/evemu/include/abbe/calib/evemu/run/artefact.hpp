@@ -35,13 +35,15 @@ struct Calibrator {
   };
   std::string name;
   double tip_radius_m = 0.0;
-  std::vector<Ball> balls;                   ///< 1, 2, 3 ... in this order, at 20 C
+  std::vector<Ball> balls;                   ///< numbers 1, 2, 3 ... in this order; dimensions at
+                                             ///< 20 C
   std::vector<Block> blocks;                 ///< numbers 1 and 2
   std::optional<Expansivity> expansivity{};  ///< nullopt: thermal expansion not stated
 };
 
-/// BadInput / NotFinite / DegenerateGeometry: ball numbers are not 1, 2, 3 .., fewer than 4 balls,
-/// balls on a line, overlapping balls, not exactly two blocks, parallel normals.
+/// Checks a calibrator. BadInput, NotFinite or DegenerateGeometry: ball numbers are not 1, 2, 3 ..,
+/// fewer than 4 balls, balls on a line, overlapping balls, not exactly two blocks, parallel
+/// normals.
 [[nodiscard]] Result<void> check(const Calibrator&);
 
 /// Temperature of the array while it is touched.
@@ -57,9 +59,10 @@ struct ArtefactTemperature {
 /// Uncertainties of the calibrated dimensions of the array. An error of the array is the same at
 /// all positions to which the array is turned on the machine.
 struct ArtefactUncertainty {
-  std::vector<double> u_ball_m;          ///< of the centre of each ball, per coordinate
+  std::vector<double> u_ball_m;          ///< standard uncertainty of the centre of each ball, per
+                                         ///< coordinate
   std::array<double, 2> u_block_rad{};   ///< as Calibrator::Block::u_rad
-  double cosine_between_blocks = 0.0;    ///< n1 . n2
+  double cosine_between_blocks = 0.0;    ///< n1 . n2, n1 and n2: normals of the blocks
   std::optional<Expansion> expansion{};  ///< nullopt: the array is taken as at 20 C
   /// Relative standard uncertainty of all lengths of the array, from the thermal expansion.
   [[nodiscard]] double u_scale() const;
@@ -79,8 +82,8 @@ struct Touch {
   Vector3 p_m = Vector3::Zero();
 };
 
-/// Transforms from the uniform coordinate system to the system in which the arguments were
-/// measured. The columns of the rotation are the unit vectors x, y, z of the uniform system: z
+/// Returns the transform from the uniform coordinate system to the system in which the arguments
+/// were measured. The columns of the rotation are the unit vectors x, y, z of the uniform system: z
 /// along n1, x along n2 x z (n1, n2: normals of the blocks); the origin is Ball1.
 /// DegenerateGeometry for parallel normals.
 [[nodiscard]] Result<RigidTransform> uniform_frame(const Vector3& ball1_m, const Vector3& n1,
@@ -101,11 +104,11 @@ struct TouchedArtefact {
   std::array<double, 2> block_index{};  ///< time of each block, as `ball_index`
 };
 
-/// A calibrator from touches of the artefact at one position on an accurate machine. `outward`:
-/// approximate outward directions of the block faces. Ball radii are the fitted radii minus the tip
-/// radius. Uncertainties are computed from the residuals of the fits. Four touches of a ball or
-/// three of a block have no residuals: `u_touch_m`, the standard uncertainty of a touch, is then
-/// used instead. TooFewObservations if `u_touch_m` is needed but not given.
+/// Computes a calibrator from touches of the artefact at one position on an accurate machine.
+/// `outward`: approximate outward directions of the block faces. Ball radii are the fitted radii
+/// minus the tip radius. Uncertainties are computed from the residuals of the fits. Four touches of
+/// a ball or three of a block have no residuals: `u_touch_m`, the standard uncertainty of a touch,
+/// is then used instead. TooFewObservations if `u_touch_m` is needed but not given.
 [[nodiscard]] Result<Calibrator> precalibrated(std::string name, std::span<const Touch>,
                                                double tip_radius_m,
                                                const std::array<Vector3, 2>& outward,

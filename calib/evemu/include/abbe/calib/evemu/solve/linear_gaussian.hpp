@@ -3,10 +3,11 @@
 /// observations y, unknowns b and omega, and noise n
 ///     y = X b + S omega + n,
 ///     b ~ N(0, diag v),  omega ~ N(0, w^2 I),  n ~ N(0, s^2 I)  after whitening.
-/// All that y states about b and omega is in one Information (estimation/information.hpp). This
-/// reduces the cost of each evaluation of the marginal likelihood, with gradient, from N^3 to
-/// (columns)^3. The likelihood has no counterpart in the estimation core, because v, w and s are
-/// unknown: with them, neither prior nor noise is part of the Information.
+/// The class stores the information of y about b and omega as one Information
+/// (estimation/information.hpp). This reduces the cost of each evaluation of the marginal
+/// likelihood, with gradient, from N^3 to (columns)^3. The storey `estimation` has no such
+/// likelihood: v, w and s are unknown here, so that neither prior nor noise can be part of the
+/// Information.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -15,7 +16,7 @@
 
 namespace abbe::calib::evemu {
 
-/// Takes whitened rows.
+/// Likelihood and posterior for given variances. All rows must be whitened.
 class LinearGaussian {
  public:
   LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& S, const Eigen::VectorXd& y);
@@ -40,12 +41,13 @@ class LinearGaussian {
   [[nodiscard]] Evidence evidence(const Eigen::VectorXd& prior, double noise_variance) const;
 
   struct Posterior {
-    Eigen::VectorXd mean;                    ///< of b and omega
-    Eigen::MatrixXd covariance;              ///< of b and omega, columns() x columns()
+    Eigen::VectorXd mean;                    ///< mean of b, then omega
+    Eigen::MatrixXd covariance;              ///< covariance of b and omega, columns() x columns()
     double effective_parameters = 0.0;       ///< trace of d(X b)/dy: degrees of freedom of b
-    double effective_pose_parameters = 0.0;  ///< trace of d(S omega)/dy: freedoms of omega
+    double effective_pose_parameters = 0.0;  ///< trace of d(S omega)/dy: degrees of freedom of
+                                             ///< omega
   };
-  /// Not finite if the noise is zero.
+  /// Posterior of b and omega. Not finite if the noise is zero.
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& prior, double noise_variance) const;
 
   /// Effect of each column of A in y on the posterior mean: columns() x columns of A.

@@ -45,7 +45,7 @@ struct PositionRows {
 /// L^-1 M for M = `rows` and ball_covariance() = C0 = L L^T, position by position: the noise of the
 /// result is white, with variance s^2.
 [[nodiscard]] Eigen::MatrixXd whitened(const Observations&, const Eigen::MatrixXd& rows);
-/// L^T M, with which M^T C0 M = (L^T M)^T (L^T M).
+/// The matrix L^T M for C0 = L L^T and M = `rows`: M^T C0 M = (L^T M)^T (L^T M).
 [[nodiscard]] Eigen::MatrixXd times_noise_root(const Observations&, const Eigen::MatrixXd& rows);
 /// L M, the inverse of whitened(): gives white noise M the covariance C0.
 [[nodiscard]] Eigen::MatrixXd coloured(const Observations&, const Eigen::MatrixXd& rows);

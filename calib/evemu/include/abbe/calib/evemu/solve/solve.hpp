@@ -1,5 +1,5 @@
 #pragma once
-/// Stage two: from errors of ball centres to a model with uncertainty. Estimators:
+/// Stage two: estimates a model with uncertainty from errors of ball centres. Estimators:
 ///   ols               ordinary least squares; the covariance takes into account that the balls of
 ///                     a position share the noise of Ball1 (noise.hpp); noise s from the residuals
 ///   ridge             shrinks all coefficients except the constants, amount by marginal likelihood
@@ -109,10 +109,11 @@ struct Statistics {
   std::size_t positions = 0, balls = 0;  ///< balls: readings over all positions
   std::size_t observations = 0;  ///< components, without those of Ball1, which are 0 by definition
   std::size_t unknowns = 0;
-  std::size_t rank = 0;               ///< of the design with columns of unit length
+  std::size_t rank = 0;               ///< rank of the design with columns of unit length
   double condition = 0.0;             ///< condition number of that design, within its rank
   double effective_parameters = 0.0;  ///< degrees of freedom of the coefficients; rank for ols
-  double degrees_of_freedom = 0.0;    ///< observations - freedoms of coefficients, pose rotations
+  double degrees_of_freedom = 0.0;    ///< observations minus the degrees of freedom of coefficients
+                                      ///< and pose rotations
   double s_m = 0.0;                   ///< noise of a ball centre per coordinate
   double w_rad = 0.0;                 ///< random pose rotation per axis; 0 where not estimated
   double slow_noise_m = 0.0;          ///< slow noise per coordinate, in addition to s_m (noise.hpp)
@@ -156,7 +157,8 @@ struct Solution {
   std::vector<Vector3> residuals_m;
   std::vector<Vector3> pose_rotations_rad;  ///< estimated, by position; empty where not modelled
   MeanRotation rotation;
-  std::optional<ArtefactUncertainty> artefact;  ///< Observations::artefact; in the covariance
+  std::optional<ArtefactUncertainty> artefact;  ///< copy of Observations::artefact; its effect is
+                                                ///< in the covariance
   /// Observations::slow_noise as given or, by bayes-pose from touches, as estimated.
   double slow_noise = 0.0;
   Statistics statistics;
@@ -165,23 +167,24 @@ struct Solution {
 /// The scaled design over the readings.
 [[nodiscard]] Result<ScaledDesign> design_of(const Observations&);
 
-/// Errors: those of sparse::grid_search for lasso, mcp and scad (folds that do not match the rows);
-/// RankDeficient for ols if the positions do not determine every combination; TooFewObservations;
-/// DegenerateGeometry if the balls enclose no volume.
+/// Estimates the model. Errors: those of sparse::grid_search for lasso, mcp and scad (folds that do
+/// not match the rows); RankDeficient for ols if the positions do not determine every combination;
+/// TooFewObservations; DegenerateGeometry if the balls enclose no volume.
 [[nodiscard]] Result<Solution> solve(const Observations&, const SolveOptions& = {});
 
 /// V at some readings, measured by another instrument whose axes are parallel to those of the
 /// machine. A constant vector that is common to all readings may be unknown.
 struct RotationReference {
-  /// `position` and `ball` are ignored; >= 3 points in the hull, not on a line.
+  /// Points of the reference; `position` and `ball` are ignored. At least 3 points in the hull, not
+  /// on a line.
   std::span<const BallError> points;
   double sigma_m = 1e-6;  ///< standard uncertainty of V, per component, independent
 };
-/// The solution rotated to agree with the reference, whose V may have another constant. The
-/// rotation omega is fitted to r = V_reference - V_model by generalised least squares, omega = K r,
-/// with the noise sigma of the reference and the uncertainty of the model's shape at the reference
-/// points (B C B^T; B: design at these points, C: covariance of the coefficients c). The covariance
-/// of the rotated solution contains both:
+/// Returns the solution rotated about Ball1 so that it agrees with the reference, whose V may have
+/// another constant. The rotation omega is fitted to r = V_reference - V_model by generalised least
+/// squares, omega = K r, with the noise sigma of the reference and the uncertainty of the model's
+/// shape at the reference points (B C B^T; B: design at these points, C: covariance of the
+/// coefficients c). The covariance of the rotated solution contains both:
 ///     C' = (1 - G K B) C (1 - G K B)^T + sigma^2 G K K^T G^T,    G: c of a rotation about Ball1.
 /// Points outside the hull of the balls (by 2 % of its size) are not used, and their numbers are
 /// reported. If chi-square exceeds the value that a correct reference exceeds once in 1000, the

@@ -25,10 +25,12 @@ struct TouchResiduals {
   /// standard deviation of a ball centre per coordinate that follows from sigma_m, rms over balls
   double s_centre_m = 0.0;
   std::vector<TouchFinding> findings;
-  std::vector<std::string> failed;  ///< "position 3, ball 4": no surface or no finite residuals
+  std::vector<std::string> failed;  ///< places such as "position 3, ball 4": no surface or no
+                                    ///< finite residuals
   std::string not_compared;         ///< why no touch was compared; else empty
 };
-/// `false_alarm`: family-wise probability. Needs touches (Observations::seen).
+/// Computes the residuals and the findings. `false_alarm`: family-wise probability. Needs touches
+/// (Observations::seen).
 [[nodiscard]] TouchResiduals touch_residuals(const Observations&, const VolumetricModel&,
                                              double false_alarm);
 

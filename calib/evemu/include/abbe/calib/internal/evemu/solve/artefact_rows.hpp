@@ -26,12 +26,12 @@ namespace abbe::calib::evemu {
 /// if the errors were given without an array (observe_errors()).
 [[nodiscard]] Eigen::MatrixXd artefact_rows(const Observations&);
 
-/// What a column of artefact_rows() is the effect of.
+/// The error of the array to which a column of artefact_rows() belongs.
 struct ArtefactError {
-  std::string name;  ///< "y of ball 3", "direction of block 1 along x", "length"
-  double u = 0.0;    ///< standard uncertainty: m, rad, relative
+  std::string name;  ///< such as "y of ball 3", "direction of block 1 along x", "length"
+  double u = 0.0;    ///< standard uncertainty in m, rad or relative
 };
-/// In the order of the columns.
+/// The errors of all columns, in the order of the columns.
 [[nodiscard]] std::vector<ArtefactError> artefact_errors(const Observations&);
 
 }  // namespace abbe::calib::evemu

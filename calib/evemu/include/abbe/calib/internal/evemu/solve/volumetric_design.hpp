@@ -1,7 +1,7 @@
 #pragma once
-/// The design matrix of any form of model at a reading, dense, for one stylus. Rows of a ball array
-/// need V at touched points only, so they have the same form for polynomials, for tables, and for
-/// both with other unknowns beside them.
+/// The design matrix of any form of model at a reading, as a dense matrix for one stylus. The rows
+/// of a ball array need V only at touched points. They therefore have the same form for polynomials
+/// and for tables, also if a model has further unknowns.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace abbe::calib::evemu {
 
-/// V(r) = B(r) U at the reading r.
+/// A model that is linear in its unknowns U: V(r) = B(r) U at the reading r.
 struct VolumetricDesign {
   VolumetricDesign(std::size_t columns, std::function<Eigen::Matrix3Xd(const Vector3&)> of_reading);
   /// The polynomials of a ball array. They are valid for the tool offset they were made with.
@@ -21,7 +21,7 @@ struct VolumetricDesign {
   std::size_t unknowns = 0;  ///< columns of B
   std::function<Eigen::Matrix3Xd(const Vector3& reading_m)> B;
 };
-/// The design of a basis, for the tool offset of the stylus.
+/// Makes the design of a basis for the tool offset of the stylus.
 [[nodiscard]] VolumetricDesign design_of(const ModelBasis&, const Vector3& tool_offset_m);
 
 }  // namespace abbe::calib::evemu

@@ -19,7 +19,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-constexpr double kBeside_m = 1e-3;  // a gauge farther from the bar is beside it
+constexpr double kBeside_m = 1e-3;  // a gauge farther from the bar than this is beside it
 
 /// A measuring machine without limits of travel: only its readings are used.
 Result<MfbMachine> machine_without_limits() {
@@ -33,7 +33,7 @@ Result<MfbMachine> machine_without_limits() {
   return machine;
 }
 
-/// True for each reversed pass.
+/// For each measurement: true if it is a reversed pass.
 Result<std::vector<bool>> reversed_passes(const Plan& plan) {
   const Vector3 normal = plan.measurements.front().bar_z.normalized();
   std::vector<bool> reversed;
@@ -109,7 +109,7 @@ Result<void> check_origin(const StepGauge& gauge) {
                          ": the origin is the centre of the tip, reading plus tool offset"));
 }
 
-/// A pass that was copied has no scatter.
+/// Returns an error if two passes have the same readings: one is a copy and would have no scatter.
 Result<void> check_distinct(const Plan& plan, std::span<const PassTouches> touches) {
   const auto same = [](const Touch& a, const Touch& b) { return a.reading_m == b.reading_m; };
   for (std::size_t m = 1; m < touches.size(); ++m) {
@@ -125,14 +125,14 @@ Result<void> check_distinct(const Plan& plan, std::span<const PassTouches> touch
   return {};
 }
 
-/// The covariances of x of the points, apart from that of the repeats.
+/// Contributions to the covariance of x of the points, without that of the repeats.
 struct PositioningCovariances {
   Eigen::MatrixXd gauge_m2, abbe_m2, temperature_m2;
 };
 
-/// Correlations of the deviations of one pass after end-point levelling, if those before are
-/// independent and have one variance: row i of `relative` are the weights of the deviations before
-/// in that of point i. Points without variance have correlation 0.
+/// Correlations of the deviations of one pass after end-point levelling. The deviations before
+/// levelling are assumed to be independent with equal variances; row i of `relative` contains their
+/// weights in the levelled deviation of point i. Points without variance have correlation 0.
 Eigen::MatrixXd correlation_of(const Eigen::MatrixXd& relative) {
   const Eigen::MatrixXd covariance = relative * relative.transpose();
   const auto inverse = [](double variance) {
@@ -142,7 +142,8 @@ Eigen::MatrixXd correlation_of(const Eigen::MatrixXd& relative) {
   return scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
-/// x is relative to point 1, y and z to the line through the first and the last point.
+/// Correlations of the levelled deviations: x is relative to point 1; y and z are relative to the
+/// line through the first and the last point.
 struct LevelledCorrelations {
   Eigen::MatrixXd x, yz;
 
@@ -160,7 +161,7 @@ struct LevelledCorrelations {
   }
 };
 
-/// Contributions of all kinds to the calibrated points.
+/// Sets the uncertainties of the calibrated points from all contributions.
 void set_uncertainty(BarCalibration& found, const PositioningCovariances& x) {
   const Eigen::Index holes = std::ssize(found.bar.O_m);
   constexpr double kNormal95 = 1.959964;
@@ -195,7 +196,7 @@ void set_points(BarCalibration& found, const Bar& nominal, const CalibratedBar& 
   for (std::size_t i = 0; i < holes; ++i) {
     found.bar.O_m[i] += reversal.error_m[i];
   }
-  // 0 by definition of the bar axes; here they have rounding errors.
+  // These coordinates are 0 by definition of the bar axes; here they still have rounding errors.
   found.bar.O_m.front().setZero();
   found.bar.O_m.back().tail<2>().setZero();
   found.u_repeats_m = reversal.u_mean_m;
@@ -219,7 +220,7 @@ void note_abbe_error(BarCalibration& found, const StepGauge& gauge) {
                                 kUmPerM * largest_m, " um to u(x)"));
 }
 
-/// What the files do not state about the temperatures, and what that costs.
+/// Adds notes about temperatures that the files do not state, with the effect on the result.
 void note_temperatures(BarCalibration& found, const StepGauge& gauge, const TouchNoise& noise) {
   const auto without_expansion = [&](std::string_view what) {
     found.notes.push_back(message(what,
@@ -242,7 +243,8 @@ void note_temperatures(BarCalibration& found, const StepGauge& gauge, const Touc
   }
 }
 
-/// An E_XX that no measuring machine has: a wrong temperature, scale or unit.
+/// Adds a note if E_XX is larger than on any measuring machine. Causes: a wrong temperature, scale
+/// or unit.
 void note_scale(BarCalibration& found) {
   constexpr double kMost = 50e-6;
   const double length_m = found.bar.O_m.back().x();
@@ -268,10 +270,10 @@ void add_notes(BarCalibration& found, const StepGauge& gauge, const Plan& plan) 
   }
 }
 
-/// The passes along the bar, and where they are on the machine.
+/// The passes along the bar, and the line of the bar on the machine.
 struct MeasuredPasses {
   Observations observed;
-  std::vector<bool> reversed;  ///< by measurement
+  std::vector<bool> reversed;  ///< for each measurement
   BarLine line;
 };
 
@@ -313,7 +315,8 @@ PositioningCovariances covariances_of(const MeasuredPasses& passes, const Positi
           u_length * u_length * distance_m * distance_m.transpose()};
 }
 
-/// Distance of the line of the gauge from that of the bar, bar axes: the larger one of both ends.
+/// Distance of the line of the gauge from that of the bar in bar axes: the larger of the values at
+/// both ends.
 Vector3 beside_bar_m(const GaugeLine& gauge, const BarLine& bar) {
   const Vector3 direction = bar.axes.transpose() * gauge.direction;
   Vector3 largest_m = Vector3::Zero();

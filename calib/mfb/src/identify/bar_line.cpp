@@ -30,7 +30,7 @@ Result<AxisAlongBar> axis_along_bar(const Plan& plan) {
   return along;
 }
 
-/// The part of `v` across x of `axes`, in these axes.
+/// The part of `v` perpendicular to the x axis of `axes`, in the coordinates of `axes`.
 Vector3 part_across(const Matrix3& axes, const Vector3& v) {
   Vector3 part = axes.transpose() * v;
   part.x() = 0.0;
@@ -53,7 +53,8 @@ void add_coordinates(const Observations& o, const PassObservation& pass, BarLine
   }
 }
 
-/// Of each of two angles: scatter of the directions of the passes.
+/// Standard uncertainty of each of the two angles of the bar, from the scatter of the directions of
+/// the passes.
 double u_of_direction(const Observations& o, const Matrix3& axes) {
   double squares = 0.0;
   for (const PassObservation& pass : o.passes) {

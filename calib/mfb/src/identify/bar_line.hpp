@@ -1,6 +1,6 @@
 #pragma once
-/// The line on which a bar lay during its calibration, from its touches. The plan only states where
-/// to look: it may be as far from the bar as observe() accepts.
+/// The line on which a bar lay during its calibration, determined from its touches. The plan gives
+/// only approximate places: the bar may be as far from its planned pose as observe() accepts.
 
 #include <string>
 #include <vector>
@@ -25,19 +25,21 @@ struct BarLine {
       Matrix3::Identity();  ///< x: mean direction of all passes; z: about bar_z of the first
   Vector3 middle_m = Vector3::Zero();  ///< centre of the tip in the middle of the bar, machine axes
   double length_m = 0.0;
-  double u_direction_rad = 0.0;      ///< of each of the two angles of x: scatter of the passes
+  double u_direction_rad = 0.0;      ///< standard uncertainty of each of the two angles of x, from
+                                     ///< the scatter of the passes
   std::vector<double> coordinate_m;  ///< AxisAlongBar::of() of each hole, mean of the passes
 };
 
-/// BadInput: bar_x of a measurement is more than 20 mrad from the machine axis of the first.
+/// Computes the line. BadInput: bar_x of a measurement is more than 20 mrad from the machine axis
+/// of the first measurement.
 [[nodiscard]] Result<BarLine> line_of_bar(const Observations&);
 
-/// Passes whose bar lay elsewhere than in the others, and a plan whose bar_x is more than
-/// `alignment_rad` from the bar.
+/// Notes about passes in which the bar lay at another place than in the other passes, and about a
+/// plan whose bar_x differs by more than `alignment_rad` from the bar.
 [[nodiscard]] std::vector<std::string> notes_of_line(const Observations&, const BarLine&,
                                                      double alignment_rad);
 
-/// "3 mrad (y 3, z -0.1 mrad)": the angle from `axes`.x to `direction`.
+/// Text of the angle from `axes`.x to `direction`, such as "3 mrad (y 3, z -0.1 mrad)".
 [[nodiscard]] std::string angle_text(const Matrix3& axes, const Vector3& direction);
 
 }  // namespace abbe::calib::mfb

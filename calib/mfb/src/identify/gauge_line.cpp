@@ -68,7 +68,7 @@ double expansion_factor(const StepGauge& gauge) {
   return 1.0 + alpha_per_K * (gauge.temperature_K - kReferenceTemperature_K);
 }
 
-/// A face whose measured distance is that of another face.
+/// Returns an error for a face whose measured distance does not fit its calibrated distance.
 Result<void> check_distances(const StepGauge& gauge, const GaugeLine& line) {
   constexpr double kMostError_m = 0.1e-3;
   for (std::size_t k = 1; k < gauge.faces.size(); ++k) {
@@ -93,7 +93,7 @@ Vector3 mean_reading(const GaugeFace& face) {
   return sum_m / static_cast<double>(face.readings_m.size());
 }
 
-/// Slope of the touches over the calibrated distances, by least squares.
+/// Vector of the slopes of the touches over the calibrated distances, by least squares.
 Vector3 direction_of(const StepGauge& gauge, const std::vector<Vector3>& face_m) {
   const auto faces = static_cast<double>(face_m.size());
   double mean_m = 0.0;
@@ -107,12 +107,13 @@ Vector3 direction_of(const StepGauge& gauge, const std::vector<Vector3>& face_m)
   return slope.normalized();
 }
 
-/// Residuals of the runs of all faces along the line, from the mean of their face.
+/// Residuals of the readings of all faces along the line, relative to the mean of their face.
 struct RunResiduals {
-  std::size_t face = 0, run = 0;  ///< of the largest one
+  std::size_t face = 0, run = 0;  ///< face and run of the largest residual
   double largest_m = 0.0;
-  double usual_m = 0.0;  ///< standard deviation from the median, which an outlier does not change
-  double s_m = 0.0;      ///< standard deviation from the squares; 0 without repeats
+  double usual_m = 0.0;  ///< robust standard deviation, from the median; an outlier does not change
+                         ///< it
+  double s_m = 0.0;      ///< standard deviation from the sum of squares; 0 without repeats
 };
 
 RunResiduals run_residuals(const StepGauge& gauge, const GaugeLine& line) {
@@ -142,7 +143,8 @@ RunResiduals run_residuals(const StepGauge& gauge, const GaugeLine& line) {
   return out;
 }
 
-/// A false trigger or dirt in one run moves the mean of its face.
+/// Returns an error if one reading is an outlier: a false trigger or dirt in one run displaces the
+/// mean of its face.
 Result<void> check_runs(const RunResiduals& runs) {
   constexpr double kWorse = 8.0, kSmall_m = 1e-6;
   if (runs.largest_m <= std::max(kWorse * runs.usual_m, kSmall_m)) {
@@ -156,7 +158,7 @@ Result<void> check_runs(const RunResiduals& runs) {
                          "run of all faces"));
 }
 
-/// Row: weights of the faces in the value at `at_m`, linear between the faces.
+/// Row of weights of the faces for the value at `at_m`, linear between the faces.
 Eigen::RowVectorXd weights_at(double at_m, const std::vector<double>& faces_m) {
   const auto above = std::upper_bound(faces_m.begin() + 1, faces_m.end() - 1, at_m);
   const Eigen::Index i = above - faces_m.begin();
@@ -168,7 +170,7 @@ Eigen::RowVectorXd weights_at(double at_m, const std::vector<double>& faces_m) {
   return weights;
 }
 
-/// Weights of the faces in the polynomial through `four` of them, at face `at`.
+/// Weights of `four` faces for the value at face `at` of the polynomial through them.
 Eigen::Vector4d lagrange_weights(const StepGauge& gauge, const std::array<std::size_t, 4>& four,
                                  std::size_t at) {
   Eigen::Vector4d weights = Eigen::Vector4d::Ones();
@@ -184,9 +186,9 @@ Eigen::Vector4d lagrange_weights(const StepGauge& gauge, const std::array<std::s
   return weights;
 }
 
-/// E of each face from the cubic through four faces around it, divided by the standard deviation
-/// that this has for independent errors of standard deviation 1. An error of the machine that is
-/// smooth over five faces does not show. Empty below 5 faces.
+/// For each face: difference of E from the cubic through four faces around it, divided by its
+/// standard deviation for independent errors of standard deviation 1. A machine error that is
+/// smooth over five faces gives small values. Empty below 5 faces.
 std::vector<double> roughness_m(const StepGauge& gauge, const Eigen::VectorXd& E_m) {
   constexpr std::size_t kWindow = 5;
   const std::size_t faces = gauge.faces.size();
@@ -236,7 +238,7 @@ std::vector<std::string> notes_of_faces(const StepGauge& gauge, const GaugeLine&
   return {};
 }
 
-/// Relative standard uncertainty of all distances at the temperature of the gauge.
+/// Relative standard uncertainty of all distances of the gauge, at its temperature.
 double u_of_scale(const StepGauge& gauge) {
   const Expansivity expansion = gauge.expansion.value_or(Expansivity{});
   const double from_20_K = gauge.temperature_K - kReferenceTemperature_K;
@@ -270,7 +272,7 @@ double u_of_alignment(const StepGauge& gauge) {
 }
 
 double most_angle_rad(const StepGauge& gauge, const BarLine& bar) {
-  constexpr double kMost = 3.0;  // 1 % of two normal components are beyond
+  constexpr double kMost = 3.0;  // 1 % of cases: vectors of two normal components are longer
   return kMost * root_sum_of_squares(u_of_alignment(gauge), bar.u_direction_rad);
 }
 
@@ -312,7 +314,7 @@ Result<Positioning> positioning_by_gauge(const StepGauge& gauge, const GaugeLine
   }
 
   Eigen::VectorXd E_faces_m(faces), variance_m2(faces), distance_m(faces);
-  Eigen::MatrixXd beside_m(faces, 3);  // w_k
+  Eigen::MatrixXd beside_m(faces, 3);  // row k: w_k of gauge_line.hpp
   for (Eigen::Index k = 0; k < faces; ++k) {
     const auto i = static_cast<std::size_t>(k);
     distance_m(k) = gauge.faces[i].distance_m;

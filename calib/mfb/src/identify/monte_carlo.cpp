@@ -14,8 +14,8 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// One pass: the centres of the tip as the machine with the identified errors reads them, without
-/// noise, in the axes of the bar.
+/// One simulated pass. `tips_m`: centres of the tip in bar axes, as read by the machine with the
+/// identified errors, without noise.
 struct SimulatedPass {
   std::vector<Vector3> tips_m;
   std::vector<Vector3> normals;
@@ -38,7 +38,7 @@ SimulatedPass simulated_pass(const Observations& o, const PassObservation& pass,
   return simulated;
 }
 
-/// Points of interest of the nominal bar in its own frame.
+/// Points of interest of the nominal bar in the bar frame.
 Result<std::vector<Vector3>> nominal_points(const Observations& o,
                                             const std::vector<NominalTouch>& touches) {
   std::vector<std::size_t> all;
@@ -64,7 +64,7 @@ class Trials {
       : o_(o), estimator_(std::move(estimator)), O_m_(std::move(O_m)), shared_(o), random_(seed) {}
 
   void add_pass(SimulatedPass pass) { passes_.push_back(std::move(pass)); }
-  /// The parameters that one trial gives.
+  /// Simulates one trial and returns the parameters estimated from it.
   [[nodiscard]] Result<Eigen::VectorXd> next();
 
  private:
@@ -73,7 +73,7 @@ class Trials {
   struct BarErrors {
     Eigen::VectorXd calibration_m;
     double alpha_per_K = 0.0;
-    std::vector<double> temperature_K;  ///< by position
+    std::vector<double> temperature_K;  ///< for each position
   };
   [[nodiscard]] BarErrors drawn_errors();
 
@@ -142,7 +142,7 @@ Result<Eigen::VectorXd> Trials::next() {
 }
 
 void set_ratios(MonteCarlo& result, const Eigen::MatrixXd& covariance) {
-  // A parameter that the datum fixes has no uncertainty, only rounding.
+  // A smaller u is rounding: the datum fixes this parameter.
   constexpr double kNone = 1e-15;
   std::size_t count = 0;
   result.smallest_ratio = std::numeric_limits<double>::infinity();

@@ -64,7 +64,8 @@ Result<void> check(const ReversalRuns& runs) {
   });
 }
 
-/// Error of the bar that a pair of passes shows, and that of the machine (x: without E_XX).
+/// Error of the bar and error of the machine (x: without E_XX) from one normal and one reversed
+/// pass.
 struct PairOfPasses {
   Vector3 bar_m, machine_m;
 

@@ -16,10 +16,11 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// The variances of a prediction are at most this factor above those of the points.
+/// Largest accepted ratio of the variance of a prediction to that of the point itself.
 constexpr double kMostOfPrediction = 100.0;
 
-/// Whitened rows of all passes and of the priors. Columns of the tables: only for the candidate.
+/// Whitened rows of all passes and of the priors. Columns of the tables exist only for the
+/// candidate.
 enum class Unknowns { All, WithoutTables };
 
 class StackedRows {
@@ -43,7 +44,7 @@ class StackedRows {
     data_rows_ = rows;
   }
 
-  /// Residuals of whitened data y; priors are 0.
+  /// Residuals of the whitened data y after the least-squares fit; the values of the priors are 0.
   [[nodiscard]] Eigen::VectorXd residuals(const Eigen::VectorXd& y) const {
     const auto U = basis_.topRows(data_rows_);
     return y - U * (U.transpose() * y);
@@ -66,7 +67,8 @@ class StackedRows {
     }
   }
 
-  /// The bar and alpha are in units of their uncertainty; tables have no prior.
+  /// Adds the rows of the priors. Bar and alpha are divided by their uncertainty, so that their
+  /// prior is 1; tables have no prior.
   void set_priors(Eigen::Ref<Eigen::MatrixXd> M, const WholeSystem& system) const {
     Eigen::Index column = system.shared.size() - first_shared_;
     for (Eigen::Index i = system.shared.bar_offset() - first_shared_; i < column; ++i) {
@@ -74,7 +76,7 @@ class StackedRows {
     }
     for (const PositionSystem& p : system.positions) {
       for (const double u : p.layout.u) {
-        M(column, column) = 1.0 / u;  // 0 without a prior
+        M(column, column) = 1.0 / u;  // 0 if the unknown has no prior
         ++column;
       }
     }
@@ -84,8 +86,7 @@ class StackedRows {
   Eigen::MatrixXd basis_;
 };
 
-/// The whitened deviations of all passes, after the errors V of a model at its touches are taken
-/// out:
+/// Whitened deviations of all passes after subtraction of the errors V of a model at the touches:
 /// delta + D s, s_k = n_k . R^T V(q_k, t).
 using ErrorsOfModel = std::function<Vector3(const Vector3& reading_m, const Vector3& tool_m)>;
 Eigen::VectorXd whitened_deviations(const Observations& o, const WholeSystem& system,
@@ -116,15 +117,16 @@ Eigen::VectorXd whitened_deviations(const WholeSystem& system) {
   return Eigen::Map<const Eigen::VectorXd>(all.data(), std::ssize(all));
 }
 
-/// O_i of one pass: its rows in the stacked data, T = L^-1 of its columns, and its covariance.
+/// O_i of one pass: its rows in the stacked data, and the matrix T, the columns of L^-1 that belong
+/// to it.
 struct PointOfPass {
   std::size_t measurement = 0, hole = 0;
-  Eigen::Index first = 0, rows = 0;  ///< of the pass
+  Eigen::Index first = 0, rows = 0;  ///< rows of the pass
   Eigen::MatrixXd T;
   Matrix3 C = Matrix3::Zero();
 };
-/// O_i of all passes of one tool in one position: what one clamping does to a point is in all of
-/// them, so they are left out together.
+/// O_i of all passes of one tool in one position. They are left out together, because the clamping
+/// displaces a point equally in all of them.
 using PointGroup = std::vector<PointOfPass>;
 
 std::vector<PointGroup> point_groups(const Observations& o, const WholeSystem& system) {
@@ -151,7 +153,7 @@ std::vector<PointGroup> point_groups(const Observations& o, const WholeSystem& s
   return out;
 }
 
-/// Q of a group, and the inverse of its covariance.
+/// The matrix Q_gg of a group (judge.hpp), and the inverse of the group's covariance.
 struct PrecisionOfGroup {
   Eigen::MatrixXd Q, C_inverse;
 
@@ -168,7 +170,8 @@ struct PrecisionOfGroup {
     }
     Q -= Z.transpose() * Z;
   }
-  /// The others predict the points: Q^-1 is at most kMostOfPrediction times the covariance.
+  /// True if the other points predict the group: Q^-1 is at most kMostOfPrediction times the
+  /// covariance.
   [[nodiscard]] bool is_predicted() const {
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Q, C_inverse,
                                                                           Eigen::EigenvaluesOnly);
@@ -176,14 +179,14 @@ struct PrecisionOfGroup {
   }
 };
 
-/// A point that was left out: squares of its deviation from the prediction.
+/// Squared deviation of a left-out point from its prediction.
 struct LeftOutPoint {
   double chi2 = 0.0, squares_m2 = 0.0;
 };
-/// By measurement and hole.
+/// The key is the measurement and the hole.
 using LeftOutPoints = std::map<std::pair<std::size_t, std::size_t>, LeftOutPoint>;
 
-/// `predicted`: the rows that decide whether a point is predicted.
+/// Computes all predictions. `predicted`: the rows that decide whether a point can be predicted.
 LeftOutPoints left_out(const Observations& o, const WholeSystem& system, const StackedRows& rows,
                        const StackedRows& predicted, const Eigen::VectorXd& y) {
   LeftOutPoints points;
@@ -210,7 +213,7 @@ LeftOutPoints left_out(const Observations& o, const WholeSystem& system, const S
   return points;
 }
 
-/// Root mean squares over points.
+/// Accumulates root mean squares over points.
 struct FigureOfPoints {
   double chi2 = 0.0, squares_m2 = 0.0, rows = 0.0;
 
@@ -238,8 +241,8 @@ Eigen::VectorXd deviations_with_tables(const Observations& o, const WholeSystem&
   });
 }
 
-/// The reading at O_i of a pass is in the validity volume of a model, widened by the rim at which
-/// the volumes of two calibrations differ.
+/// True if the reading at O_i of a pass is in the validity volume of a model. The volume is
+/// enlarged by the amount by which the volumes of two calibrations typically differ.
 bool is_inside(const Observations& o, const PassObservation& pass, std::size_t hole,
                const ValidityVolume& volume) {
   constexpr double kWidened = 1.04;
@@ -271,8 +274,8 @@ Observations passes_of_model(const Observations& all, const VolumetricModel& mod
   return o;
 }
 
-/// Adds the comparison with the active model at the points inside its volume. It has a system of
-/// its own: passes for which the model is not valid have no part in it.
+/// Adds the comparison with the active model at the points inside its volume. It uses separate
+/// observations, without passes for which the active model is not valid.
 Result<void> compare_with_active(HeldOutFigures& figures, const Observations& all,
                                  const LeftOutPoints& of_candidate, const VolumetricModel& active,
                                  const SolveOptions& options) {

@@ -32,7 +32,8 @@ void note_set_aside(Verdict& verdict, const Identification& found) {
   }
 }
 
-/// Residuals far below the stated noise: then chi-square and outliers are judged too mildly.
+/// Adds a note if the residuals are much smaller than the stated noise. Chi-square and outliers are
+/// then tested with too large limits.
 void note_small_residuals(Verdict& verdict, const Statistics& s) {
   constexpr double kSmall = 0.5;
   if (s.degrees_of_freedom > 0.0 && s.chi2_per_dof < kSmall) {
@@ -42,7 +43,7 @@ void note_small_residuals(Verdict& verdict, const Statistics& s) {
   }
 }
 
-/// More than a few excluded touches are no single outliers.
+/// Refuses the model if more touches are excluded than single outliers explain.
 void judge_set_aside(Verdict& verdict, const Identification& found) {
   constexpr double kMostSetAside = 0.005;
   std::size_t touches = found.set_aside.size();

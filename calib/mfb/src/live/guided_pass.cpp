@@ -11,12 +11,12 @@ bool same_feature(const Target& a, const Target& b) {
   return a.feature == b.feature && a.index == b.index && a.side == b.side;
 }
 
-/// The limits of a pose are two standard deviations of its prior.
+/// Prior of a pose that is known only from the plan: its limits are two standard deviations.
 PosePrior prior_of_plan(const ObserveLimits& limits) {
   return {.shift_m = limits.beside_plan_m / 2.0, .rotation_rad = limits.beside_plan_rad / 2.0};
 }
 
-/// A second tool or pass finds the same clamping again.
+/// Prior of a pose that was already determined with another tool or pass of the same clamping.
 constexpr PosePrior kSameClamping{.shift_m = 1e-3, .rotation_rad = 1e-3};
 
 }  // namespace

@@ -73,7 +73,7 @@ class TouchGuide::Session {
   GuideOptions options_;
   std::vector<NominalTouch> nominal_;
   std::vector<PassTouches> passes_;
-  std::size_t at_ = 0;  ///< the measurement that is being touched
+  std::size_t at_ = 0;  ///< index of the measurement that is being touched
   std::optional<GuidedPass> pass_;
   std::map<std::string, PoseOfTouches> poses_;  ///< by position
   std::size_t off_in_a_row_ = 0, discarded_in_a_row_ = 0;
@@ -86,8 +86,9 @@ void TouchGuide::Session::begin_pass() {
                 known == poses_.end() ? std::nullopt : std::optional(known->second));
 }
 
-/// The touch is where the next measurement of another position begins, or in the first feature of
-/// the next measurement of the same position and not where the last touch was made.
+/// True if the touch is at the first place of the next measurement. If that has another position,
+/// the touch is where it begins. If it has the same position, the touch is in its first feature and
+/// not at the place of the last touch.
 bool TouchGuide::Session::begins_next_pass(const Vector3& reading_m) const {
   if (at_ + 1 == plan_.measurements.size() || !pass_->has_enough()) {
     return false;
@@ -167,7 +168,7 @@ void TouchGuide::Session::off_place(const GuidedPass::Nearest& nearest, const Ve
   std::string text = where() + message("the touch at the reading ", mm_text(reading_m), " is ",
                                        kMmPerM * nearest.off_m, " mm from the nearest place, ",
                                        place_name(nearest.place));
-  // Of two touches that contradict one another, either may be wrong.
+  // If two touches contradict each other, either of them may be wrong.
   if (pass_->touches().size() == 1) {
     pass_->clear();
     passes_[at_].clear();
@@ -182,7 +183,7 @@ void TouchGuide::Session::off_place(const GuidedPass::Nearest& nearest, const Ve
   }
 }
 
-/// Features, orientation and calibrated places of the pass.
+/// Checks features, orientation and calibrated places of the pass.
 Result<void> TouchGuide::Session::checked() const {
   Plan alone = plan_;
   alone.measurements = {measurement()};

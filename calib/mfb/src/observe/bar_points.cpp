@@ -8,7 +8,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Where an axis meets a plane; false if they are parallel.
+/// Computes the point at which an axis meets a plane; false if they are nearly parallel.
 bool meet(const PointAndDirection& axis, const PointAndDirection& plane, Vector3& at) {
   constexpr double kParallel = 0.1;  // sine of the angle between axis and plane
   const double nd = plane.direction.dot(axis.direction);

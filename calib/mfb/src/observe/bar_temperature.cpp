@@ -18,7 +18,7 @@ double celsius(double temperature_K) {
   return kReference_C + temperature_K - kReferenceTemperature_K;
 }
 
-/// ": all lengths change by 562 um/m"; empty if the bar states no expansion.
+/// Text such as ": all lengths change by 562 um/m"; empty if the bar states no expansion.
 std::string effect_on_lengths(const Bar& bar, std::string_view lengths, double off_K) {
   return bar.expansion ? message(": ", lengths, " lengths change by ",
                                  kUmPerM * bar.expansion->alpha_per_K * off_K, " um/m")
@@ -41,8 +41,9 @@ double common_K(double a_K, double b_K) {
   return a_K * b_K > 0.0 ? std::copysign(std::min(std::abs(a_K), std::abs(b_K)), a_K) : 0.0;
 }
 
-/// From the positions before and after, or at the ends from the next two, if these agree: a bar
-/// that warms up, or that was warmer from one position on, differs from one side only.
+/// Difference of the temperature at position i from both positions next to it (at the ends: from
+/// the next two positions, if these agree). It is 0 if a bar warms up steadily or is warmer from
+/// one position on, because it then differs on one side only.
 double unlike_neighbours_K(const std::vector<const PassObservation*>& passes, std::size_t i,
                            double most_K) {
   const auto at_K = [&](std::size_t k) { return passes[k]->temperature_K; };

@@ -10,7 +10,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Index of the position, which is appended if it is new.
+/// Index of the position of a measurement; a new position is appended.
 std::size_t position_index(Observations& o, const Measurement& m) {
   for (std::size_t i = 0; i < o.positions.size(); ++i) {
     if (o.positions[i].name == m.position) {
@@ -22,7 +22,7 @@ std::size_t position_index(Observations& o, const Measurement& m) {
   return o.positions.size() - 1;
 }
 
-/// Number of the tool in its position: tools with the same offset are the same.
+/// Index of the tool in its position: tools with the same offset are the same.
 std::size_t tool_index(const Observations& o, const PassObservation& pass) {
   std::size_t tools = 0;
   for (const PassObservation& other : o.passes) {
@@ -51,7 +51,8 @@ void set_pairs(Observations& o) {
   }
 }
 
-/// Half a cell beyond the first and last node: there the polynomial of the last cell is used.
+/// BadInput for a reading more than half a cell beyond the first or last node. Within this distance
+/// the polynomial of the last cell is used.
 Result<void> check_inside(const Vector3& reading_m, const MachineNodes& nodes) {
   for (const Axis a : kAllAxes) {
     const std::vector<double>& x = nodes[index(a)].nodes_m;

@@ -1,5 +1,4 @@
 #pragma once
-/// Parts that observe() and planned_observations() have in common.
 
 #include <map>
 #include <memory>
@@ -9,7 +8,7 @@
 
 namespace abbe::calib::mfb {
 
-/// The nominal bar at the centres of the tip, and its derivatives for sets of touches.
+/// The nominal bar with the touched centres of the tip, and its derivatives for sets of touches.
 class NominalBar {
  public:
   NominalBar(const Bar&, double tip_radius_m);
@@ -23,17 +22,17 @@ class NominalBar {
   std::map<std::vector<std::size_t>, Eigen::MatrixXd> known_;
 };
 
-/// Positions, tools and pairs of a plan; poses as planned, no touches.
+/// Observations with the positions, tools and pairs of a plan; poses as planned, without touches.
 [[nodiscard]] Result<Observations> observations_of_plan(const Bar&, const Plan&, const MfbMachine&);
 
-/// Sets everything of a pass that follows from its touches and the pose of its position, but not
-/// the deviations. `time`: 0..1 of each touch. BadInput for a reading outside the nodes.
+/// Sets all members of a pass that follow from its touches and the pose of its position; the
+/// deviations are not set. `time`: 0 to 1 for each touch. BadInput for a reading outside the nodes.
 [[nodiscard]] Result<void> place_touches(Observations&, PassObservation&, NominalBar&,
                                          std::vector<std::size_t> places,
                                          const std::vector<double>& time);
 
-/// Deviations of one pass from its touches. `sets_pose`: the pose of the position becomes that of
-/// this pass. Errors of observe().
+/// Computes the deviations of one pass from its touches. `sets_pose`: the pose of the position
+/// becomes that of this pass. Errors of observe().
 [[nodiscard]] Result<void> observe_pass(Observations&, PassObservation&, const PassTouches&,
                                         NominalBar&, const ObserveLimits&, bool sets_pose);
 

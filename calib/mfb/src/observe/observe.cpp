@@ -48,8 +48,8 @@ Result<void> check_calibrated_places(const ExtractedBar& bar, const Bar& calibra
   return {};
 }
 
-/// How the bar lies. The signature is the calibrated y of the holes, which contains the nominal
-/// shifts.
+/// Finds the orientation of the bar. The signature is the calibrated y of the holes, which contains
+/// the nominal shifts.
 Result<OrientationFit> found_orientation(const ExtractedBar& bar, const Bar& calibrated) {
   std::vector<double> signature_m;
   for (const Vector3& O : calibrated.O_m) {
@@ -68,7 +68,8 @@ Result<void> check_not_turned(const OrientationFit& fit, double as_planned_rms_m
               kMmPerM * as_planned_rms_m, " mm as planned: turn it and measure again"));
 }
 
-/// `of_known_bar`: features and sizes are those of the bar, so that its orientation must be found.
+/// Checks the orientation. `of_known_bar`: features and sizes are those of the bar, so that not
+/// finding an orientation is an error.
 Result<void> check_orientation(const ExtractedBar& bar, const Bar& calibrated, bool of_known_bar) {
   if (!calibrated.pattern.has_signature()) {
     return {};
@@ -120,8 +121,9 @@ Result<ExtractedBar> checked_bar(const Observations& o, const PassObservation& p
       });
 }
 
-/// Derivatives and normals of the bar as it was touched: features may be 1 mm beside the pattern,
-/// and some combinations of O_i have a noise of a few nm.
+/// Sets derivatives and normals for the touched places instead of the nominal ones. This is
+/// necessary because features may be 1 mm beside the pattern, and some combinations of O_i have a
+/// noise of only a few nm.
 void set_derivatives_of_touches(const Observations& o, PassObservation& pass,
                                 const std::vector<Vector3>& tips_m) {
   const BarPose& pose = o.positions[pass.position].pose;
@@ -131,7 +133,7 @@ void set_derivatives_of_touches(const Observations& o, PassObservation& pass,
   }
   const Result<PointsOfInterest> points =
       points_of_interest(bar_touches(o.bar.pattern, pass.touched, in_bar_m), Matrix3::Identity());
-  if (points) {  // else those of the nominal bar remain
+  if (points) {  // otherwise the derivatives of the nominal bar are kept
     pass.dO_dtouch = points->dO_dtouch;
     pass.normal = points->normals;
   }

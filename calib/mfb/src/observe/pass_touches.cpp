@@ -15,7 +15,8 @@ std::size_t fewest_of(Feature feature) {
   return feature == Feature::Plane ? kFewestOfPlane : kFewestOfCylinder;
 }
 
-/// Every feature keeps enough touches; a pattern with fewer needs all of them.
+/// Checks that every feature has enough touches. A feature with fewer touches in the pattern needs
+/// all of them.
 Result<void> check_counts(const TouchPattern& pattern, const Measurement& m,
                           const std::vector<bool>& used) {
   const std::vector<NominalTouch> all = nominal_touches(pattern, 0.0);

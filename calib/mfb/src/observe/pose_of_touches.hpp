@@ -1,5 +1,5 @@
 #pragma once
-/// The pose of a bar from the touches made so far (touch_guide.hpp).
+/// Estimates the pose of a bar from the touches made so far (touch_guide.hpp).
 
 #include <Eigen/Core>
 
@@ -16,13 +16,13 @@ struct PosePrior {
 class PoseOfTouches {
  public:
   PoseOfTouches(const Vector3& origin_m, const PosePrior& prior);
-  /// The same pose, which another measurement of the same clamping may find up to `prior` beside
-  /// it.
+  /// The same pose as the start for another measurement of the same clamping, with the uncertainty
+  /// `prior`.
   [[nodiscard]] PoseOfTouches with_prior(const PosePrior& prior) const;
 
-  /// `planned_m`: centre of the tip at the planned pose.
+  /// Expected centre of the tip. `planned_m`: centre of the tip at the planned pose.
   [[nodiscard]] Vector3 expected_m(const Vector3& planned_m) const;
-  /// A touch with the outward normal `normal` was made at `tip_m`.
+  /// Adds a touch at `tip_m`. `normal`: outward normal of the surface.
   void add(const Vector3& planned_m, const Vector3& normal, const Vector3& tip_m);
 
  private:

@@ -9,8 +9,9 @@ namespace {
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 
-/// Axis of the least-squares cylinder, by the steps of fit/cylinder.hpp with normal equations: a
-/// step need not be exact, because the last step is zero. Lengths in units of the radius.
+/// Axis of the least-squares cylinder, by the steps of fit/cylinder.hpp with normal equations.
+/// Their rounding errors do not matter: the iteration ends when the step is zero. Lengths in units
+/// of the radius.
 PointAndDirection cylinder_axis(std::span<const Vector3> points_m, const PointAndDirection& nominal,
                                 double radius_m) {
   constexpr int kMostSteps = 8;

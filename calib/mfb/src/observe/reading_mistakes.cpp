@@ -15,7 +15,7 @@ constexpr double kNearPlan_m = 20e-3;
 /// The centre of the tip from a reading and the tool offset of its measurement.
 using TipOfReading = std::function<Vector3(const Vector3& reading_m, const Vector3& tool_m)>;
 
-/// All touches of a pass are near their planned places.
+/// The planned places of all touches. fit() is true if every touch is near its planned place.
 class PlannedPlaces {
  public:
   PlannedPlaces(const Bar& bar, const Plan& plan)
@@ -52,7 +52,7 @@ Vector3 as_given(const Vector3& reading_m, const Vector3& tool_m) {
   return reading_m + tool_m;
 }
 
-/// Corrections that concern all readings.
+/// Texts of the corrections that concern all readings and explain them.
 std::vector<std::string> common_corrections(const PlannedPlaces& places,
                                             std::span<const PassTouches> passes, const Plan& plan) {
   std::vector<std::string> texts;
@@ -79,7 +79,8 @@ std::vector<std::string> common_corrections(const PlannedPlaces& places,
   return texts;
 }
 
-/// "; the touches of Y1 fit measurement Y2" for each pass that fits another measurement only.
+/// Text such as "; the touches of Y1 fit measurement Y2" for each pass that fits only another
+/// measurement.
 std::string exchanged_measurements(const PlannedPlaces& places, std::span<const PassTouches> passes,
                                    const Plan& plan) {
   std::string text;

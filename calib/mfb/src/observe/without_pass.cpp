@@ -5,7 +5,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Numbers the tools of a position from 0.
+/// Numbers the tools of a position consecutively from 0.
 void renumber_tools(Observations& o, std::size_t position) {
   std::vector<std::size_t> known;
   for (PassObservation& pass : o.passes) {
@@ -21,7 +21,7 @@ void renumber_tools(Observations& o, std::size_t position) {
   }
 }
 
-/// The other pass of the pair has no partner any more; later pairs get the numbers before.
+/// Removes a pair: its remaining pass has no pair, and the numbers of later pairs decrease by one.
 void remove_pair(Observations& o, std::size_t position, std::size_t pair) {
   for (PassObservation& pass : o.passes) {
     if (pass.position != position || !pass.pair) {

@@ -11,7 +11,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Axes along the bar, across it, and up, with the origin at O_1 or at the first face.
+/// Coordinate system with the axes along the bar, across it, and up. Origin: O_1 or the first face.
 struct TravelFrame {
   Vector3 origin_m = Vector3::Zero();
   Matrix3 axes = Matrix3::Identity();
@@ -22,7 +22,7 @@ struct TravelFrame {
   }
 };
 
-/// Builds the path. Places are in the travel frame.
+/// Builds the path of the tip. All places are in the travel frame.
 class TouchPath {
  public:
   TouchPath(const TravelFrame& frame, const Vector3& from_m, const MachineTouchOptions& options)
@@ -30,8 +30,8 @@ class TouchPath {
     out_.push_back(frame.of_machine(from_m));
   }
 
-  /// Begins a feature: from now on the path to a place leads up, across and down to `column`,
-  /// whence the way up is free.
+  /// Begins a feature: the path to its first touch leads up, across and down to `column`, a place
+  /// above which the way up is free.
   void go_over_to(const Vector3& column) {
     way_ = std::exchange(out_, {});
     way_.push_back(raised(way_.back()));
@@ -45,7 +45,8 @@ class TouchPath {
     }
   }
 
-  /// Touches `at` from `before`. `out`: the way from there to a place whence the way up is free.
+  /// Moves to `before` and touches `at`. `out`: path from `before` to a place above which the way
+  /// up is free.
   void touch(const Vector3& before, const Vector3& at, const Vector3& normal,
              std::vector<Vector3> out) {
     go_to(before);
@@ -75,11 +76,12 @@ class TouchPath {
   TravelFrame frame_;
   double height_m_;
   MachineTouches made_;
-  std::vector<Vector3> way_;  ///< to the next touch, begun at the place before the latest
-  std::vector<Vector3> out_;  ///< from the place before the latest touch, out of its feature
+  std::vector<Vector3> way_;  ///< path to the next touch; starts at the place before the latest
+                              ///< touch
+  std::vector<Vector3> out_;  ///< path from the place before the latest touch out of its feature
 };
 
-/// One pass, feature by feature.
+/// Plans the path of one pass, feature by feature.
 class PassPath {
  public:
   PassPath(const Bar& bar, double tip_radius_m, TouchPath path, const MachineTouchOptions& options)
@@ -104,7 +106,7 @@ class PassPath {
   [[nodiscard]] MachineTouches done() && { return std::move(path_).done(); }
 
  private:
-  /// From the axis of the hole.
+  /// Touches a hole, starting from its axis.
   void touch_hole(const Vector3& at, const Vector3& normal, bool begins) {
     const TouchPattern& pattern = bar_.pattern;
     const Vector3 before(pattern.hole_x_m[feature_->index], pattern.hole_y_m[feature_->index],
@@ -115,7 +117,7 @@ class PassPath {
     path_.touch(before, at, normal, {});
   }
 
-  /// Around the rod on a square across its axis.
+  /// Touches a rod. The tip moves around it on a square across the axis of the rod.
   void touch_rod(const Vector3& at, const Vector3& normal, bool begins) {
     const TouchPattern& pattern = bar_.pattern;
     const double half_m = pattern.rod_radius_m + tip_radius_m_ + options_.clearance_m;
@@ -206,7 +208,7 @@ Result<PassOnMachine> pass_on_machine(const Bar& bar, const Plan& plan, std::siz
   }
 
   PassOnMachine out;
-  // The pattern is touched from above also where bar_z points down: its z counts along "up".
+  // The pattern is touched from above also if bar_z points down: its z is counted along "up".
   PassPath path(bar, plan.tip_radius_m, TouchPath(frame, from_m, options), options);
   for (const std::size_t place : order) {
     out.targets.push_back(nominal[place].target);

@@ -9,7 +9,8 @@ namespace {
 
 using StyliOfPosition = std::vector<std::size_t>;
 
-/// One stylus or two of opposite stem. The first one is on the probing side of the bar.
+/// Possible styli of a position: one stylus, or two with opposite stems. The first one is on the
+/// probing side of the bar.
 std::vector<StyliOfPosition> styli_choices(const PlanTask& task, std::size_t holes) {
   const StyliAlong found = styli_along(task, holes);
   std::vector<StyliOfPosition> choices;
@@ -24,7 +25,7 @@ std::vector<StyliOfPosition> styli_choices(const PlanTask& task, std::size_t hol
   return choices;
 }
 
-/// Ends and middle of an interval without its margins; one value if it is short.
+/// Both ends and the middle of an interval without its margins; one value if the interval is short.
 std::vector<double> places_between(double min_m, double max_m, double margin_m) {
   constexpr double kShort_m = 10e-3;
   min_m += margin_m;
@@ -77,7 +78,7 @@ class CandidateList {
     }
   }
 
-  /// Bars along an axis at 3 x 3 places across it.
+  /// Adds bars along an axis at 3 x 3 places across it.
   void add_across(const std::string& label, std::size_t axis, double start_m, const Vector3& z,
                   const StyliOfPosition& styli) {
     const auto k = static_cast<Eigen::Index>(axis);
@@ -98,7 +99,7 @@ class CandidateList {
     }
   }
 
-  /// Inclined bars in the middle of their plane, at three places along their holes.
+  /// Adds inclined bars in the middle of their plane, at three places along their holes.
   void add_places(const std::string& label, const Vector3& x, const Vector3& z,
                   const StyliOfPosition& styli, std::size_t holes) {
     const Matrix3 axes = bar_axes(x, z);
@@ -111,7 +112,7 @@ class CandidateList {
     }
   }
 
-  /// Across the bar all touches are within the travel.
+  /// Places across the bar at which all touches are within the travel.
   [[nodiscard]] std::vector<double> places_across(const BarPlacer::Room& room,
                                                   Eigen::Index k) const {
     return places_between(room.min_m(k), room.max_m(k),

@@ -17,14 +17,14 @@ std::vector<Measurement> measurements_of(const PlanTask& task, const PlannedPosi
   return plan_of(task, {position}).measurements;
 }
 
-/// "DXZ" of "DXZ2", "X" of "X1a".
+/// The leading capital letters of a name: "DXZ" of "DXZ2", "X" of "X1a".
 std::string label_of(const std::string& name) {
   const auto end =
       std::find_if(name.begin(), name.end(), [](char c) { return c < 'A' || c > 'Z'; });
   return {name.begin(), end};
 }
 
-/// Bars along axes first; numbers the positions of each label.
+/// Sorts the positions (bars along axes first) and numbers those of each label.
 std::vector<PlannedPosition> in_order(std::vector<PlannedPosition> positions) {
   for (PlannedPosition& p : positions) {
     p.name = label_of(p.name);
@@ -41,7 +41,7 @@ std::vector<PlannedPosition> in_order(std::vector<PlannedPosition> positions) {
   return positions;
 }
 
-/// The positions that may be in a set, with what they show.
+/// The candidate positions, with the information of each.
 struct Pool {
   std::vector<PlannedPosition> positions;
   std::vector<PositionInformation> information;
@@ -99,8 +99,8 @@ class Choice {
   [[nodiscard]] std::size_t exchanged() const { return exchanged_; }
 
  private:
-  /// Of the candidates with as many styli as `replaced` those that show most of what the other
-  /// positions lack, best first.
+  /// Indices of candidates with as many styli as `replaced`. Selected are those with most
+  /// information about the combinations that the other positions determine worst; best first.
   [[nodiscard]] std::vector<std::size_t> promising(const SetProblem::State& state,
                                                    std::size_t replaced) const {
     constexpr std::size_t kEvaluated = 12;
@@ -123,8 +123,8 @@ class Choice {
     return best;
   }
 
-  /// Replaces position i by the candidate with the least merit. The worst uncertainty must not
-  /// increase.
+  /// Replaces position i by the candidate with the smallest merit(), if the set improves. The worst
+  /// uncertainty must not increase.
   [[nodiscard]] bool replace(const SetProblem& problem, std::size_t i) {
     constexpr double kBetter = 1.0 - 1e-3;
     std::vector<std::size_t> others = chosen_;
@@ -147,7 +147,7 @@ class Choice {
     return best.has_value();
   }
 
-  /// Half of the progress is the collection of the candidates.
+  /// Reports the progress; collecting the candidates is the first half.
   [[nodiscard]] Result<void> report(std::size_t collected) const {
     if (options_.progress) {
       const double all = static_cast<double>(std::max<std::size_t>(pool_.positions.size(), 1));
@@ -162,7 +162,7 @@ class Choice {
   const ChoiceOptions& options_;
   Pool pool_;
   std::vector<std::size_t> chosen_;
-  Eigen::VectorXd u2_;  ///< of the chosen set
+  Eigen::VectorXd u2_;  ///< u2 of the chosen set (SetProblem::State)
   std::size_t exchanged_ = 0;
 };
 

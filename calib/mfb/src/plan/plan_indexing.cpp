@@ -10,11 +10,11 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// How a bar is clamped on the table with both axes at zero if it is in a position at these
-/// angles.
+/// Orientation and place of a bar on the table with both axes at zero, if it is in the wanted
+/// position at these angles.
 struct Clamping {
   Matrix3 axes;
-  Vector3 middle_m;  ///< of the bar, from the centre
+  Vector3 middle_m;  ///< middle of the bar, relative to the centre of the table
   double swivel_rad = 0.0, turn_rad = 0.0;
 };
 
@@ -29,7 +29,8 @@ Matrix3 rotation(Axis axis, double angle_rad) {
   return R;
 }
 
-/// The same place on the table: an origin may be set to 5 mm, but indexing is exact to less.
+/// True if both are the same place on the table. Tolerance: an operator may set an origin only to 5
+/// mm, but the indexed positions of one clamping agree to less than 1 mm.
 bool same(const Clamping& a, const Clamping& b) {
   constexpr double kSame_m = 1e-3, kSame = 1e-3;
   return (a.axes - b.axes).cwiseAbs().maxCoeff() < kSame &&
@@ -45,7 +46,8 @@ void add_distinct(std::vector<double>& angles_rad, double angle_rad) {
   }
 }
 
-/// Multiples of 90 degrees, and the angles between the bars and the axes.
+/// Angles that can be useful: multiples of 90 degrees, and the angles between the bars and the
+/// axes.
 std::vector<double> useful_angles(const std::vector<PlannedPosition>& positions) {
   std::vector<double> of_bars_rad{0.0};
   for (const PlannedPosition& p : positions) {
@@ -96,7 +98,7 @@ const Clamping* find_same(const std::vector<Clamping>& all, const Clamping& want
   return found == all.end() ? nullptr : &*found;
 }
 
-/// The clamping that gives most of the positions that are not done; null: all are done.
+/// The clamping that reaches most of the positions not yet reached; null: all are reached.
 const Clamping* most_useful(const std::vector<std::vector<Clamping>>& possible,
                             const std::vector<bool>& done) {
   const Clamping* best = nullptr;

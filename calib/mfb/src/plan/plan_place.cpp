@@ -20,7 +20,8 @@ Vector3 in_plane(std::size_t first, std::size_t second, double angle_rad, double
   return x;
 }
 
-/// Component along the ram of the tool offset of a stylus along it, or of the first stylus.
+/// Component along the ram of a tool offset: that of the stylus along the ram, else that of the
+/// first stylus.
 Vector3 ram_offset_m(const PlanTask& task) {
   const std::size_t ram = index(task.machine.chain.order_w_to_t()[2]);
   const StyliAlong found = styli_along(task, ram);
@@ -126,7 +127,8 @@ std::optional<Vector3> BarPlacer::nearest(const Matrix3& axes, std::span<const s
 std::optional<BarDirection> BarPlacer::along(std::size_t axis, std::size_t other, double sign,
                                              const Vector3& z,
                                              std::span<const std::size_t> styli) const {
-  constexpr int kMostSteps = 140;  // 70 degrees: further inclined it is a bar along the other axis
+  constexpr int kMostSteps = 140;  // 70 degrees; with more inclination it is a bar along the other
+                                   // axis
   for (int step = 0; step <= kMostSteps; ++step) {
     const double angle_rad = kHalfDegree_rad * step;
     const Vector3 x = in_plane(axis, other, angle_rad, sign);

@@ -1,5 +1,5 @@
 #pragma once
-/// Places of a bar at which all readings stay within the travel.
+/// Finds places of a bar at which all readings stay within the travel.
 
 #include <optional>
 #include <span>
@@ -9,63 +9,67 @@
 
 namespace abbe::calib::mfb {
 
-/// Which stylus enters the holes along an axis. bar_z points against the stem of the first one.
+/// The styli that can enter holes along an axis. bar_z points against the stem of the first one.
 struct StyliAlong {
-  std::optional<std::size_t> against;  ///< stem along the negative axis
-  std::optional<std::size_t> along;    ///< stem along the positive axis
+  std::optional<std::size_t> against;  ///< index of the stylus with its stem along the negative
+                                       ///< axis
+  std::optional<std::size_t> along;    ///< index of the stylus with its stem along the positive
+                                       ///< axis
 };
-/// Of several styli with the same stem the longest.
+/// Finds the styli along an axis. If several have the same stem, the longest is selected.
 [[nodiscard]] StyliAlong styli_along(const PlanTask&, std::size_t axis);
 
 /// Direction of the bar in the plane of two axes.
 struct BarDirection {
   Vector3 x = Vector3::UnitX();
-  double angle_rad = 0.0;  ///< from the first axis
+  double angle_rad = 0.0;  ///< angle from the first axis
 };
 
-/// Bar axes from bar_x and bar_z.
+/// Axes of the bar as columns, from bar_x and bar_z.
 [[nodiscard]] Matrix3 bar_axes(const Vector3& x, const Vector3& z);
 
 class BarPlacer {
  public:
   explicit BarPlacer(const PlanTask&);
 
-  /// From the first to the last hole.
+  /// Distance from the first to the last hole.
   [[nodiscard]] double length_m() const { return length_m_; }
   [[nodiscard]] double travel_m(std::size_t axis) const { return hi_m(axis) - lo_m(axis); }
   [[nodiscard]] double lo_m(std::size_t axis) const;
   [[nodiscard]] double hi_m(std::size_t axis) const;
-  /// Touches may be outside the nodes by the radius of a hole (a bar as long as the travel has its
-  /// outer holes at the ends), but not by more than half a cell, where files end.
+  /// Permitted distance of touches beyond the end nodes: the radius of a hole (a bar as long as the
+  /// travel has its outer holes at the ends), but less than half a cell, the limit of observe().
   [[nodiscard]] double overhang_m(std::size_t axis) const;
 
-  /// For the bar at the origin.
+  /// Range of the readings for a bar whose O_1 is at the origin.
   [[nodiscard]] ReadingRange readings(const Matrix3& axes,
                                       std::span<const std::size_t> styli) const;
-  /// Places of O_1 between which all readings are possible, with all holes in the volume that a
-  /// stylus along the ram reaches (a stylus across it reaches places beside the table); min > max:
-  /// none.
+  /// Range of places of O_1 for which all readings are within the travel, and all holes are in the
+  /// volume that a stylus along the ram reaches. (A stylus across the ram also reaches places
+  /// beside the table.) min > max: there is no such place.
   struct Room {
     Vector3 min_m, max_m;
     [[nodiscard]] bool exists() const { return (max_m - min_m).minCoeff() >= 0.0; }
   };
   [[nodiscard]] Room room(const Matrix3& axes, std::span<const std::size_t> styli) const;
-  /// The place of O_1 next to `wanted_m`; nullopt: the bar does not fit.
+  /// The possible place of O_1 that is nearest to `wanted_m`; nullopt: the bar does not fit.
   [[nodiscard]] std::optional<Vector3> nearest(const Matrix3& axes,
                                                std::span<const std::size_t> styli,
                                                const Vector3& wanted_m) const;
 
-  /// Along `axis`, or inclined towards `other` as little as the travel requires, for holes along
-  /// the third axis. sign: of the component along `other`. nullopt: the bar does not fit in the
-  /// plane.
+  /// Direction along `axis`, or inclined towards `other` by the smallest angle that the travel
+  /// requires; the holes are along the third axis. `sign`: sign of the component along `other`.
+  /// nullopt: the bar does not fit in the plane.
   [[nodiscard]] std::optional<BarDirection> along(std::size_t axis, std::size_t other, double sign,
                                                   const Vector3& z,
                                                   std::span<const std::size_t> styli) const;
-  /// As near to 45 degrees as the travel permits; sign: of the component along `second`.
+  /// Direction as near to 45 degrees as the travel permits. `sign`: sign of the component along
+  /// `second`.
   [[nodiscard]] std::optional<BarDirection> diagonal(std::size_t first, std::size_t second,
                                                      double sign, const Vector3& z,
                                                      std::span<const std::size_t> styli) const;
-  /// Readings of O_1 for bars along an axis: the first at its lower end, the last at its upper end.
+  /// Readings of O_1 for bars along an axis: the first bar at the lower end of the axis, the last
+  /// at the upper end.
   [[nodiscard]] std::vector<double> starts_m(std::size_t axis) const;
 
  private:

@@ -6,11 +6,11 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// An error that no position shows has this uncertainty [m, rad], far above the limits.
+/// Prior uncertainty [m, rad], far above the limits, of an error that no position determines.
 constexpr double kUnknown = 1e-2;
 constexpr double kPower = 3.0;
 
-/// 1 / limit of each parameter.
+/// 1 / limit of the uncertainty of each parameter.
 Eigen::VectorXd inverse_limits(const ParameterLayout& layout, const SolveOptions& options) {
   Eigen::VectorXd inverse = Eigen::VectorXd::Constant(
       static_cast<Eigen::Index>(layout.model_size()), 1.0 / options.most_u_rad);

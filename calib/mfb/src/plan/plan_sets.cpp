@@ -13,19 +13,19 @@ namespace {
 constexpr std::size_t kNoRole = 3;
 
 enum class Probed { OneSide, BothSides };
-/// Where Indexed places the bar: at its own place, at the centre of the rotary axes in the plane of
-/// the table, or at the centre.
+/// Place of the bar in NamedSet::Indexed: its place in the other sets, the centre of the rotary
+/// axes in the plane of the table only, or the centre.
 enum class IndexedPlace { Own, OnTurn, Centre };
 
-/// A measurement of [Viprey 2016] in roles. Roles count from 0: a, b, c.
+/// A measurement of [Viprey 2016] in terms of roles. Roles count from 0: a, b, c.
 struct Entry {
   int number = 1;
-  std::size_t along = 0, second = kNoRole;  ///< second: of a diagonal
-  double sign = 1.0;                        ///< of the component along `second`
+  std::size_t along = 0, second = kNoRole;  ///< roles of the axes; second: for a diagonal
+  double sign = 1.0;                        ///< sign of the component along `second`
   std::size_t holes = 2;
   Probed probed = Probed::OneSide;
-  /// Place across the bar as a part of the travel of a, b, c: those of the reference machine, whose
-  /// travel is 550 mm, were 100, 150, 250, 450 and 500 mm.
+  /// Place across the bar as a fraction of the travel of a, b, c. On the reference machine with a
+  /// travel of 550 mm these places are 100, 150, 250, 450 and 500 mm.
   std::array<double, 3> at{0.5, 0.5, 0.5};
   IndexedPlace indexed = IndexedPlace::Centre;
 };
@@ -68,7 +68,7 @@ std::vector<Entry> entries_of(NamedSet set) {
   return all;
 }
 
-/// Places the entries of one set one after the other.
+/// Places the entries of one set, one after another.
 class SetPlacer {
  public:
   SetPlacer(const PlanTask& task, NamedSet set, const Vector3& centre_m)
@@ -135,8 +135,8 @@ class SetPlacer {
     return styli;
   }
 
-  /// Bars that are inclined because two axes are short are perpendicular to each other, and not
-  /// parallel to the first diagonal.
+  /// Direction of the bar. Bars that are inclined because two axes are short are perpendicular to
+  /// each other, and not parallel to the first diagonal.
   [[nodiscard]] std::optional<BarDirection> direction_of(
       const Entry& e, const Vector3& z, const std::vector<std::size_t>& styli) const {
     if (e.second != kNoRole) {
@@ -147,7 +147,7 @@ class SetPlacer {
         placer_.along(axis(e.along), axis(other), other > e.along ? 1.0 : -1.0, z, styli);
     constexpr std::size_t kRam = 2;
     if (direction && direction->angle_rad > 0.0 && e.along == kRam) {
-      direction->x *= -1.0;  // a swivel axis reaches it within 90 degrees
+      direction->x *= -1.0;  // so that a swivel axis reaches it within 90 degrees
     }
     return direction;
   }
@@ -167,7 +167,7 @@ class SetPlacer {
     }
   }
 
-  /// Places of the middle of the bar: one, or those of bars that overlap.
+  /// Places of the middle of the bar: one place, or those of several overlapping bars.
   [[nodiscard]] std::vector<Vector3> centres_of(const Entry& e, double angle_rad,
                                                 const std::vector<std::size_t>& styli) const {
     Vector3 centre_m = Vector3::Zero();
@@ -201,8 +201,8 @@ class SetPlacer {
     return centres_m;
   }
 
-  /// From the reading to the tip. Along the stem of a stylus across the ram it is left out: such
-  /// styli have opposite ones, and the bar is between them.
+  /// Offset from the reading to the tip. It is zero along the stem of a stylus across the ram: such
+  /// styli are used in opposite pairs, with the bar between them.
   [[nodiscard]] Vector3 offset_of(const Entry& e, const std::vector<std::size_t>& styli) const {
     Vector3 offset_m = Vector3::Zero();
     for (const std::size_t s : styli) {
@@ -215,8 +215,8 @@ class SetPlacer {
     return offset_m;
   }
 
-  /// The styli need more travel along the holes than there is, or the bar is too long for its
-  /// plane.
+  /// Error for a bar that does not fit: the styli need more travel along the holes than there is,
+  /// or the bar is too long for its plane.
   [[nodiscard]] tl::unexpected<Error> does_not_fit(const Entry& e, const std::string& label,
                                                    const Vector3& z,
                                                    const std::vector<std::size_t>& styli) const {

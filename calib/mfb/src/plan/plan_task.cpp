@@ -67,7 +67,7 @@ Result<void> check_nodes_of(const PlanTask& task) {
   return {};
 }
 
-/// Places of O_1 are rounded, for people.
+/// Places of O_1 are rounded to this value, so that they are easy to read and set.
 constexpr double kRounding_m = 1e-4;
 
 char side_of(const PlanTask& task, const PlannedPosition& position, std::size_t stylus) {
@@ -145,7 +145,8 @@ Plan plan_of(const PlanTask& task, const std::vector<PlannedPosition>& positions
 
 double duration_s(const Bar& bar, const Plan& plan, const TouchDrive& drive) {
   const std::vector<NominalTouch> touches = nominal_touches(bar.pattern, plan.tip_radius_m);
-  // From touch to touch the tip moves around the feature: twice the straight distance.
+  // Between two touches the tip moves around the feature; the path is taken as twice the straight
+  // distance.
   constexpr double kDetour = 2.0;
   double path_m = bar.pattern.hole_x_m.back();
   for (std::size_t i = 1; i < touches.size(); ++i) {

@@ -56,7 +56,7 @@ void append_plane(std::vector<NominalTouch>& all, const TouchPattern& p, std::si
   }
 }
 
-/// w EI / q without the straight line through the supports.
+/// The deflection w EI / q (bar.hpp) without the terms c1 x + c2.
 double free_deflection(const Sag& s, double x_m) {
   const auto power_of_positive = [](double v, int n) { return power(std::max(v, 0.0), n); };
   const double x0 = s.beam_x_m[0], x1 = s.beam_x_m[1], a = s.supports_m[0], b = s.supports_m[1];

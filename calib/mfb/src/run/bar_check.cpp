@@ -28,7 +28,7 @@ Result<void> check_finite(const TouchPattern& p) {
   return {};
 }
 
-/// Holes and rods alternate along x, beginning with a hole at 0.
+/// Checks that holes and rods alternate along x, beginning with a hole at 0.
 Result<void> check_order(const TouchPattern& p) {
   if (p.holes() < 3 || p.hole_y_m.size() != p.holes() || p.rod_x_m.size() + 1 != p.holes()) {
     return bad_bar(message(p.holes(), " holes with ", p.hole_y_m.size(), " shifts and ",

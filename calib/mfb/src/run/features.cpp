@@ -64,7 +64,7 @@ Result<void> fit_planes(BarFeatures& features, const BarTouches& touches, const 
   return {};
 }
 
-/// Rod j must lie between hole j and hole j + 1.
+/// Checks that rod j lies between hole j and hole j + 1.
 Result<void> check_order(const BarFeatures& f, const Vector3& x) {
   for (std::size_t j = 0; j < f.rods.size(); ++j) {
     const double before = x.dot(f.rods[j].point - f.holes[j].point);
@@ -80,7 +80,7 @@ Result<void> check_order(const BarFeatures& f, const Vector3& x) {
   return {};
 }
 
-/// The plane on the left must lie at +y of its rod, the other one at -y.
+/// Checks that the left plane lies at +y of its rod and the right one at -y.
 Result<void> check_sides(const BarFeatures& f, const Vector3& y) {
   for (std::size_t j = 0; j < f.planes.size(); ++j) {
     for (const Side side : {Side::Left, Side::Right}) {

@@ -23,7 +23,8 @@ struct PlaneOfFeature {
   Derived point, normal;
 };
 
-/// The touches of one feature are the columns from `first` on.
+/// Extends the derivatives D of a and b to all touches. The touches of the feature are the columns
+/// from `first` on.
 template <class Derivatives>
 std::pair<Derived, Derived> derived(const Vector3& a, const Vector3& b, const Derivatives& D,
                                     Eigen::Index first, Eigen::Index touches) {
@@ -33,7 +34,7 @@ std::pair<Derived, Derived> derived(const Vector3& a, const Vector3& b, const De
   return {da, db};
 }
 
-/// Where the axis meets the plane: p + t d with t = n . (c - p) / n . d.
+/// Point at which the axis meets the plane: p + t d with t = n . (c - p) / n . d.
 Result<Derived> intersection(const AxisOfFeature& axis, const PlaneOfFeature& plane,
                              const std::string& name) {
   constexpr double kParallel = 0.1;  // sine of the angle between axis and plane
@@ -70,7 +71,7 @@ PlaneOfFeature plane_through(const std::vector<Derived>& points, const Vector3& 
     const Vector3 c = p.value - plane.point.value;
     M += c * c.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(M);  // ascending
+  const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(M);  // in ascending order
   Vector3 n = eigen.eigenvectors().col(0);
   n = n.dot(towards) < 0.0 ? Vector3(-n) : n;
 
@@ -140,7 +141,7 @@ class DerivedFeatures {
   Eigen::Index touches_;
 };
 
-/// PL_j, PR_j of each rod.
+/// The points PL_j and PR_j of each rod.
 Result<std::vector<std::array<Derived, 2>>> ends_of_rods(const DerivedFeatures& f) {
   std::vector<std::array<Derived, 2>> ends;
   for (std::size_t j = 0; j < f.rods.size(); ++j) {
@@ -156,7 +157,7 @@ Result<std::vector<std::array<Derived, 2>>> ends_of_rods(const DerivedFeatures& 
   return ends;
 }
 
-/// Bar frame and O_i in it, with derivatives.
+/// Sets the bar frame and O_i in this frame, with derivatives.
 void set_bar_frame(PointsOfInterest& result, const std::vector<Derived>& O, const Derived& z) {
   const Vector3 along = O.back().value - O.front().value;
   const double length_m = along.norm();

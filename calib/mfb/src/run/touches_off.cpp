@@ -5,7 +5,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// The touches of a pass that belong to the pattern, and where they are planned in the bar's frame.
+/// The touches of a pass that belong to the pattern, with their planned places in the bar frame.
 struct PlannedTouches {
   std::vector<std::size_t> touches;
   std::vector<Vector3> measured_m, planned_m;

@@ -9,12 +9,12 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Variances of all parameters of the model by source.
+/// Variances of all parameters of the model, separated by source.
 struct VarianceParts {
   Eigen::VectorXd total, bar, expansion, temperature, roll, drift;
 };
 
-/// Squares of the columns of `covariance`, expanded to all parameters and summed.
+/// For all parameters: sum of the squares of the expanded columns.
 Eigen::VectorXd squares_of(const SharedUnknowns& shared, const Eigen::MatrixXd& columns) {
   return shared.expanded(columns.topRows(shared.parameters())).rowwise().squaredNorm();
 }
@@ -47,7 +47,7 @@ VarianceParts variance_parts(const WholeSystem& system, const SharedEstimate& es
   return parts;
 }
 
-/// The variance that the estimation of the drift adds; zero without pairs.
+/// Sets the variance that is caused by estimating the drift; zero without pairs.
 void set_drift(VarianceParts& parts, const Observations& o, const WholeSystem& system,
                NuisanceOptions options) {
   const bool pairs = std::any_of(o.passes.begin(), o.passes.end(),

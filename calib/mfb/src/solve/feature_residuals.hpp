@@ -1,6 +1,6 @@
 #pragma once
-/// Residuals of the touches to the features of their pass, after the identified errors of the
-/// machine are taken out (identify.hpp).
+/// Residuals of the touches of one feature in one pass, after the identified machine errors have
+/// been subtracted (identify.hpp).
 
 #include <vector>
 
@@ -11,8 +11,8 @@ namespace abbe::calib::mfb {
 struct ResidualsOfFeature {
   std::size_t measurement = 0;
   Target feature;                    ///< k is not used
-  std::vector<std::size_t> k;        ///< of each used touch
-  std::vector<Vector3> corrected_m;  ///< centre of the tip without errors of the machine
+  std::vector<std::size_t> k;        ///< number k of each used touch
+  std::vector<Vector3> corrected_m;  ///< centre of the tip without the machine errors
   std::vector<double> residual_m;    ///< along the outward normal
   std::size_t degrees_of_freedom = 0;
 
@@ -20,13 +20,13 @@ struct ResidualsOfFeature {
   [[nodiscard]] double sigma_m() const;
 };
 
-/// `U`: parameters of the model.
+/// Computes the residuals of all features. `U`: parameters of the model.
 [[nodiscard]] std::vector<ResidualsOfFeature> feature_residuals(const Observations&,
                                                                 std::span<const PassTouches>,
                                                                 const Eigen::VectorXd& U);
 
-/// The same feature without one of its touches: `place` in k. nullopt if the rest does not
-/// determine it. `off_m`: distance of the touch that was left out.
+/// Fit of a feature without one of its touches. `off_m`: distance of this touch from the fitted
+/// feature.
 struct WithoutTouch {
   double squares_m2 = 0.0;
   double off_m = 0.0;

@@ -13,7 +13,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Observations and solution of the touches that are not excluded.
+/// Observations, solution and residuals without the excluded touches.
 struct Adjusted {
   Observations observations;
   Solution solution;
@@ -30,7 +30,7 @@ Result<Adjusted> adjusted(const Bar& bar, const Plan& plan, std::span<const Pass
   });
 }
 
-/// The touches of a pass that may be excluded.
+/// Largest number of touches of a pass that may be excluded.
 std::size_t most_of_pass(const PassTouches& touches, const SetAsideOptions& options) {
   return static_cast<std::size_t>(
       std::ceil(options.most_of_pass * static_cast<double>(touches.size())));
@@ -49,7 +49,7 @@ std::size_t most_of_all(std::span<const PassTouches> touches, const SetAsideOpti
   return static_cast<std::size_t>(std::ceil(options.most_of_all * static_cast<double>(all)));
 }
 
-/// Excludes touches one after another and adjusts again after each.
+/// Excludes touches one after another and repeats the adjustment after each.
 Result<Adjusted> without_outliers(Adjusted at, const Bar& bar, const Plan& plan,
                                   std::vector<PassTouches>& touches, const MfbMachine& machine,
                                   const Options& options, Outliers& outliers) {
@@ -117,7 +117,8 @@ Result<VolumetricModel> model_of(const Observations& o, const Solution& solution
   });
 }
 
-/// The sequence is no adjustment: its residuals contain what it leaves out, not only faults.
+/// Likely cause for Estimator::Sequential. It is not an adjustment: its residuals also contain
+/// effects that the method neglects, so that they do not prove a fault.
 LikelyCause cause_of_sequence(const Statistics& s) {
   if (!(s.chi2_per_dof > s.chi2_per_dof_limit)) {
     return {};

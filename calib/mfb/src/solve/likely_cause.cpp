@@ -12,9 +12,10 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Prior of the drift that is searched: more than any machine drifts during one pass.
+/// Prior of the drift in the search for a cause: larger than the drift of any machine during one
+/// pass.
 constexpr double kDriftSearched_m = 20e-6;
-/// Prior of the correction of a hole that is searched.
+/// Prior of the correction of a hole in the search for a cause.
 constexpr double kHoleSearched_m = 100e-6;
 
 /// The indices with the largest values, largest first.
@@ -35,7 +36,7 @@ void keep_better(LikelyCause& best, Cause cause, const Result<Statistics>& found
   }
 }
 
-/// Without all passes with the position and tool of a pass.
+/// The observations without all passes that have the position and tool of the given pass.
 Observations without_clamping(const Observations& all, std::size_t pass) {
   const std::size_t position = all.passes[pass].position, tool = all.passes[pass].tool;
   Observations rest = all;

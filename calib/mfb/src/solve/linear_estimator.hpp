@@ -7,7 +7,7 @@
 namespace abbe::calib::mfb {
 
 struct LinearEstimator {
-  std::vector<Eigen::MatrixXd> of_pass;  ///< parameters x 3N, by pass
+  std::vector<Eigen::MatrixXd> of_pass;  ///< H of each pass: parameters x 3N
 };
 [[nodiscard]] Result<LinearEstimator> linear_estimator(const Observations&, const SolveOptions&);
 

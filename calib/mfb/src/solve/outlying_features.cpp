@@ -12,10 +12,10 @@ namespace {
 
 /// Residuals of the fit of one feature.
 struct FeatureOfPass {
-  std::string name;  ///< "R2: hole 6"
+  std::string name;  ///< such as "R2: hole 6"
   double rms_m = 0.0;
 };
-/// By Feature.
+/// Features of all passes, grouped by kind (the index is the value of Feature).
 using FeaturesOfPasses = std::array<std::vector<FeatureOfPass>, 3>;
 
 void add_features(const Measurement& m, const BarFeatures& features, FeaturesOfPasses& all) {
@@ -47,7 +47,7 @@ double median_rms_m(const std::vector<FeatureOfPass>& features) {
 std::vector<std::string> outlying_features(const Bar& bar, const Plan& plan,
                                            std::span<const PassTouches> touches) {
   constexpr double kWorse = 5.0;
-  constexpr double kRoundingOfTouches_m = 1e-9;  // simulated touches without noise
+  constexpr double kRoundingOfTouches_m = 1e-9;  // for simulated touches without noise
   FeaturesOfPasses all;
   for (std::size_t m = 0; m < plan.measurements.size(); ++m) {
     const Measurement& measurement = plan.measurements[m];

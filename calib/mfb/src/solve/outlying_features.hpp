@@ -8,9 +8,9 @@
 
 namespace abbe::calib::mfb {
 
-/// One sentence for each feature of a pass whose touches fit much worse than those of the same kind
-/// usually do: more than 5 times the median of their residuals. The touches of all passes can be
-/// fitted (observe() did it).
+/// Returns one sentence for each feature of a pass whose touches fit much worse than those of its
+/// kind: more than 5 times the median of their residuals. The touches of all passes must have
+/// passed observe().
 [[nodiscard]] std::vector<std::string> outlying_features(const Bar&, const Plan&,
                                                          std::span<const PassTouches>);
 

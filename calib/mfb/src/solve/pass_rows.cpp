@@ -12,7 +12,7 @@ namespace {
 
 using estimation::kNoPrior;
 
-/// Elements of dO_dtouch below this value are rounding; those that matter are 0.01 and more.
+/// Smaller elements of dO_dtouch are rounding errors; real effects are 0.01 and more.
 constexpr double kNoEffect = 1e-12;
 
 /// Adds D_ik times the columns of touch k to row i, for all rows on which the touch has an effect.
@@ -34,7 +34,8 @@ void add_touch(RowMajorRows& rows, const Eigen::MatrixXd& D, Eigen::Index k, con
   }
 }
 
-/// Columns of the parameters U from those of values and second derivatives (cell_form.hpp).
+/// Converts columns of node values and second derivatives (cell_form.hpp) to columns of the
+/// parameters U.
 RowMajorRows without_curvatures(const RowMajorRows& cells, const TableBasis& basis) {
   const ParameterLayout& layout = basis.layout();
   RowMajorRows rows =
@@ -76,7 +77,8 @@ RowMajorRows model_rows(const Observations& o, const PassObservation& pass) {
   return without_curvatures(cells, o.basis);
 }
 
-/// Effect of a displacement of the touches by `weight` of each along the three bar axes: 3N x 3.
+/// Matrix (3N x 3): effect on O_i if each touch is displaced by `weight` along each of the three
+/// bar axes.
 Eigen::MatrixXd displaced(const PassObservation& pass, const Eigen::VectorXd& weight) {
   Eigen::MatrixXd along(std::ssize(pass.touched), 3);
   for (std::size_t k = 0; k < pass.touched.size(); ++k) {

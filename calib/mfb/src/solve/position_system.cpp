@@ -10,13 +10,14 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Standard uncertainty of each coordinate of O_i for what the rows neglect: 1 to 10 nm of the
-/// exact transforms, and the derivatives of the nominal bar instead of the real one. Without it
-/// some combinations of O_i would have a noise far below that: the N values O_z depend on the
-/// heights of N - 1 rods, so that without the shifts of the signature their covariance is singular.
+/// Standard uncertainty that is added to each coordinate of O_i for effects that the rows neglect:
+/// 1 to 10 nm of the exact transforms, and the derivatives of the nominal instead of the real bar.
+/// Without it some combinations of O_i would have almost no noise: the N values O_z depend on the
+/// heights of only N - 1 rods, so that their covariance is singular except for the shifts of the
+/// signature.
 constexpr double kNeglected_m = 3e-9;
 
-/// D D^T. A touch has an effect on few O_i.
+/// The product D D^T. It uses that a touch has an effect on few O_i.
 Eigen::MatrixXd times_own_transpose(const Eigen::MatrixXd& D) {
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(D.rows(), D.rows());
   std::vector<Eigen::Index> rows;
@@ -40,7 +41,7 @@ Eigen::Index priors_of(const NuisanceLayout& layout) {
   return std::count_if(layout.u.begin(), layout.u.end(), [](double u) { return std::isfinite(u); });
 }
 
-/// [L | A | y] of the data, whitened.
+/// Appends the whitened rows [L | A | y] of one pass.
 void append_pass(PositionSystem& system, Eigen::Index first, const RowMajorRows& A,
                  const Eigen::MatrixXd& L, const Eigen::VectorXd& y, const RootOfNoise& root) {
   system.A.middleRows(first, A.rows()) = root.matrixL().solve(A);
@@ -71,8 +72,8 @@ class EliminationOfNuisances {
     const Eigen::Index n = qr_.cols();
     return qr_.matrixQR().topRows(n).triangularView<Eigen::Upper>();
   }
-  /// Q^T rows. Each reflection I - tau v v^T needs one pass over the rows for the sum and one for
-  /// the change, along the memory.
+  /// Computes Q^T rows. Each reflection I - tau v v^T reads the rows once for the sum and once for
+  /// the change, in the order of memory.
   void apply(RowMajorRows& rows) const {
     Eigen::RowVectorXd sum(rows.cols());
     for (Eigen::Index k = 0; k < qr_.cols(); ++k) {
@@ -174,7 +175,8 @@ Eigen::MatrixXd gain_rows(const PositionSystem& s) {
   elimination.apply(turned);
 
   Eigen::MatrixXd gain = s.E.transpose() * turned.bottomRows(s.E.rows());
-  for (std::size_t k = 0; k < s.passes.size(); ++k) {  // times the inverse of the root of the noise
+  for (std::size_t k = 0; k < s.passes.size(); ++k) {  // multiplies by the inverse of the root of
+                                                       // the noise
     auto part = gain.middleCols(s.rows_of_pass * static_cast<Eigen::Index>(k), s.rows_of_pass);
     part = s.root[k].matrixU().solve(part.transpose()).transpose().eval();
   }

@@ -47,7 +47,8 @@ PassResiduals residuals_of_pass(const Eigen::VectorXd& whitened, const Eigen::Ve
   return pass;
 }
 
-/// Rates and constants are along the bar axes; a drift is reported along the machine axes.
+/// Adds the estimated drifts, which are reported along the machine axes; the unknown rates and
+/// constants are along the bar axes.
 void append_drift(Solution& solution, const Observations& o, const PositionSystem& s,
                   const SharedEstimate& estimate, const Eigen::VectorXd& c) {
   for (const std::size_t second : s.passes) {

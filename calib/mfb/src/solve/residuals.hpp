@@ -1,5 +1,5 @@
 #pragma once
-/// Residuals, poses and drift of a simultaneous adjustment.
+/// Computes residuals, poses and drift of a simultaneous adjustment.
 
 #include "abbe/calib/internal/mfb/solve/simultaneous.hpp"
 
@@ -20,9 +20,9 @@ struct NuisanceRow {
                                                        Eigen::Index k);
 
 void set_residuals(Solution&, const Observations&, const WholeSystem&, const SharedEstimate&);
-/// Degrees of freedom of each pass: its rows less their diagonal elements of the hat matrix. Row i
-/// of the whitened [A L] has the element |row i of L R^-1|^2 + |row i of (A - L R^-1 G) X|^2, X
-/// X^T: covariance of the shared unknowns.
+/// Sets the degrees of freedom of each pass: its number of rows minus their diagonal elements of
+/// the hat matrix. Row i of the whitened [A L] has the element |row i of L R^-1|^2 + |row i of (A -
+/// L R^-1 G) X|^2, X X^T: covariance of the shared unknowns.
 void set_degrees_of_freedom(Solution&, const WholeSystem&, const SharedEstimate&);
 
 }  // namespace abbe::calib::mfb

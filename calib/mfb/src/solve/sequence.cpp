@@ -100,7 +100,7 @@ HoleRows Sequence::detrended(HoleRows rows, std::size_t m, Eigen::Index axis) co
   const Eigen::RowVectorXd first = rows.row(0), rise = rows.row(last) - first;
   rows.rowwise() -= first;
   rows -= t * rise;
-  rows.row(last).setZero();  // without rounding
+  rows.row(last).setZero();  // exactly zero, without rounding errors
   return rows;
 }
 
@@ -142,7 +142,7 @@ void Sequence::impose_datum(ErrorMotion motion, Eigen::Ref<Eigen::MatrixXd> rows
     const Eigen::Map<const Eigen::VectorXd> x(axis.nodes_m.data(), last + 1);
     rows.rowwise() -= begin;
     rows -= ((x.array() - x(0)) / (x(last) - x(0))).matrix() * rise;
-    rows.row(last).setZero();  // without rounding
+    rows.row(last).setZero();  // exactly zero, without rounding errors
     return;
   }
 

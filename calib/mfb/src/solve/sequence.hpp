@@ -1,5 +1,5 @@
 #pragma once
-/// The steps of the sequence of [Viprey 2016], on values and derivatives at once.
+/// The steps of the sequence of [Viprey 2016], computed for values and derivatives together.
 
 #include <array>
 #include <vector>
@@ -8,9 +8,9 @@
 
 namespace abbe::calib::mfb {
 
-/// Values at the holes of a profile, one row per hole. The first column is that of the
-/// observations, the others their derivatives by each coordinate of each profile: every step of the
-/// sequence is linear, so that the covariance of the result follows from the last columns.
+/// Values at the holes of a profile, one row per hole. The first column contains the values for the
+/// observations, the other columns their derivatives by each coordinate of each profile. Every step
+/// of the sequence is linear, so that the covariance of the result follows from the derivatives.
 using HoleRows = Eigen::MatrixXd;
 
 class Sequence {
@@ -18,31 +18,32 @@ class Sequence {
   /// `o` must outlive the object.
   Sequence(const Observations& o, std::vector<Profile>, SequentialRoles);
 
-  /// NotApplicable: the bar does not cover the nodes of an axis.
+  /// Computes all steps. NotApplicable: the bar does not cover the nodes of an axis.
   Result<void> run();
-  /// Parameters of the model: first column, and their derivatives.
+  /// First column: parameters of the model; other columns: their derivatives.
   [[nodiscard]] const Eigen::MatrixXd& U() const { return U_; }
   [[nodiscard]] const std::vector<Profile>& profiles() const { return profiles_; }
 
  private:
-  using Delta = std::array<HoleRows, 3>;  ///< x, y, z of the machine
+  using Delta = std::array<HoleRows, 3>;  ///< components x, y, z in machine axes
 
-  /// Mean of the passes; derivatives by the mean deviations in bar axes.
+  /// Mean deviations of the passes of profile m in machine axes, with derivatives by the mean
+  /// deviations in bar axes.
   [[nodiscard]] Delta in_machine_axes(std::size_t m, Eigen::Index first,
                                       Eigen::Index columns) const;
-  /// The deviations without the effect of the errors found so far: delta = -V.
+  /// Deviations of profile m without the effect of the errors found so far (delta = -V).
   [[nodiscard]] Delta without_known(std::size_t m) const;
-  /// The same minus the first row.
+  /// As without_known(), relative to the first row.
   [[nodiscard]] Delta from_first(std::size_t m) const;
 
-  /// Coordinate of the tip at each hole.
+  /// Coordinate of the tip along a machine axis at each hole.
   [[nodiscard]] Eigen::VectorXd tip(std::size_t m, Eigen::Index axis) const;
-  /// J of the paper.
+  /// The vector J of [Viprey 2016]: minus the tool offset.
   [[nodiscard]] Vector3 J(std::size_t m) const { return -profiles_[m].tool_m; }
 
-  /// (D of the second - D of the first) / difference, in one direction.
+  /// (Deviation of the second profile - that of the first) / difference_m, in one direction.
   [[nodiscard]] HoleRows slope(const ProfilePair&, std::size_t direction) const;
-  /// Minus the line through the first and the last value.
+  /// The values minus the line through the first and the last value.
   [[nodiscard]] HoleRows detrended(HoleRows, std::size_t m, Eigen::Index axis) const;
   /// Mean of `value` over all profiles along an axis.
   template <class Value>
@@ -56,9 +57,9 @@ class Sequence {
 
   /// Sets a table from its values at the holes of profile m, in datum G2.
   Result<void> set(ErrorMotion, const HoleRows& values, std::size_t m);
-  /// Values at the nodes of an axis from those at the holes.
+  /// Interpolates values at the nodes of an axis from those at the holes.
   [[nodiscard]] Result<HoleRows> at_nodes(Axis, const HoleRows& values, std::size_t m) const;
-  /// Subtracts what datum G2 requires from the rows of a table.
+  /// Subtracts a constant or line from the rows of a table, so that they satisfy datum G2.
   void impose_datum(ErrorMotion, Eigen::Ref<Eigen::MatrixXd> rows) const;
   Result<void> x_stage();
   Result<void> y_stage();

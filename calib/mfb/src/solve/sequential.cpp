@@ -61,7 +61,7 @@ Result<Eigen::MatrixXd> root_of_result(const Observations& o, const Sequence& se
   return all;
 }
 
-/// Residuals and poses for the tables found: every position gets its best pose.
+/// Sets residuals and poses for the tables found; every position gets its best-fit pose.
 Result<void> set_residuals_of_sequence(Solution& solution, const Observations& o,
                                        const SolveOptions& options) {
   const Result<WholeSystem> system = whole_system(o, nuisance_options(options));

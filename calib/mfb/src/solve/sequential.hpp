@@ -1,5 +1,5 @@
 #pragma once
-/// The sequence of [Viprey 2016]: see solve.hpp.
+/// Estimates the errors by the sequence of [Viprey 2016]; see solve.hpp.
 
 #include "abbe/calib/mfb/solve/solve.hpp"
 

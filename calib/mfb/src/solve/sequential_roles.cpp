@@ -11,8 +11,8 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Places and tools that differ by less are the same; a difference that shows an angle is larger
-/// than kApart_m.
+/// Places and tools that differ by less than kTogether_m are the same. A difference that is used to
+/// determine an angle must be larger than kApart_m.
 constexpr double kTogether_m = 10e-3, kApart_m = 50e-3;
 
 std::vector<std::size_t> axes_along(const Vector3& bar_x) {
@@ -30,7 +30,8 @@ Vector3 middle_of(const Profile& p) {
   return 0.5 * (p.tip_m.front() + p.tip_m.back());
 }
 
-/// The pair with the largest difference of `value` among profiles that differ in nothing else.
+/// The pair of profiles with the largest difference of the place (or tool, if `of_tool`) along one
+/// axis, among profiles that are otherwise the same.
 std::optional<ProfilePair> widest_pair(const std::vector<Profile>& all,
                                        const std::vector<std::size_t>& among, std::size_t axis,
                                        bool of_tool) {
@@ -64,7 +65,7 @@ Result<void> set_pair(ProfilePair& pair, const std::vector<Profile>& all,
   return {};
 }
 
-/// Two bars in a plane of two axes, ascending and descending.
+/// Finds two bars in a plane of two axes: an ascending and a descending one.
 Result<void> set_diagonals(std::array<std::size_t, 2>& pair, const std::vector<Profile>& all,
                            const std::vector<std::size_t>& plane, const char* name) {
   std::array<bool, 2> found{};

@@ -1,5 +1,5 @@
 #pragma once
-/// Roles of the measurements in the sequence of [Viprey 2016], from their geometry.
+/// Finds the roles of the measurements in the sequence of [Viprey 2016] from their geometry.
 
 #include <array>
 #include <vector>
@@ -8,15 +8,15 @@
 
 namespace abbe::calib::mfb {
 
-/// The passes of one position with one tool, averaged.
+/// Mean of the passes of one position with one tool.
 struct Profile {
   std::vector<std::size_t> passes;
   Matrix3 axes = Matrix3::Identity();  ///< of the bar
   Vector3 tool_m = Vector3::Zero();
-  std::vector<Vector3> tip_m;      ///< of each hole, in the order of `hole`
-  std::vector<Vector3> on_axis_m;  ///< the same on the axis x of the bar, at the nominal places
+  std::vector<Vector3> tip_m;      ///< place of the tip at each hole, in the order of `hole`
+  std::vector<Vector3> on_axis_m;  ///< nominal place of each hole, projected on the bar axis x
   std::vector<std::size_t>
-      hole;  ///< holes, ascending along the axis of the machine or along the bar
+      hole;  ///< indices of the holes, ascending along the machine axis or along the bar
   std::vector<std::size_t> along;  ///< axes of the machine along which the bar extends, 1 or 2
 };
 [[nodiscard]] std::vector<Profile> profiles_of(const Observations&);
@@ -34,7 +34,7 @@ struct SequentialRoles {
   ProfilePair z_with_two_tools_x, z_with_two_tools_y;
   std::array<std::array<std::size_t, 2>, 3> diagonals{};  ///< in XY, XZ, YZ: slopes + and -
 };
-/// NotApplicable: the text names the role that no measurement has.
+/// Finds the roles. NotApplicable: the text names the role that no measurement has.
 [[nodiscard]] Result<SequentialRoles> roles_of(const std::vector<Profile>&);
 
 }  // namespace abbe::calib::mfb

@@ -14,8 +14,8 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Standard deviation of a touch, of which `sigma_m` are estimates with k degrees of freedom: their
-/// median divided by that of the root of chi-square / k ([Wilson 1931]).
+/// Standard deviation of a touch from many estimates `sigma_m` with k degrees of freedom each:
+/// their median, divided by the median of sqrt(chi-square / k) ([Wilson 1931]).
 double typical_sigma_m(std::vector<double> sigma_m, std::size_t k) {
   const double a = 1.0 - 2.0 / (9.0 * static_cast<double>(k));
   return median(sigma_m) / std::sqrt(a * a * a);
@@ -27,7 +27,7 @@ bool keeps_enough(const ResidualsOfFeature& f, const TouchPattern& pattern) {
   return f.k.size() > std::min(fewest, pattern.touches_of(kind));
 }
 
-/// Distances of the touches of planes from the middle of the bar, along y, in each pass.
+/// Distances of the touches of planes from the middle of the bar along y, for each pass.
 class PlanesInBar {
  public:
   PlanesInBar(const Observations& o, const std::vector<BarPose>& poses,
@@ -48,8 +48,9 @@ class PlanesInBar {
     }
   }
 
-  /// Of a touch from its median over the other passes, less the mean of this difference over the
-  /// other planes: the constants of a second tool and a drift displace all planes of a pass.
+  /// Distance of a touch from its median over the other passes, minus the mean of this distance
+  /// over the other planes of the pass: the constants of a second tool and a drift displace all
+  /// planes of a pass.
   [[nodiscard]] double off_m(std::size_t measurement, const Target& target) const {
     double sum_m = 0.0;
     std::size_t count = 0;
@@ -84,8 +85,8 @@ class PlanesInBar {
   std::map<std::size_t, std::map<std::size_t, double>> y_m_;  ///< by measurement, then by place
 };
 
-/// The touches without which the residuals of the feature are smallest. Touches that look alike
-/// leave sums of squares that differ by noise only.
+/// The touches without which the residuals of the feature are smallest. Touches cannot be
+/// distinguished if their sums of squares differ only by noise.
 Suspects suspects_in(const ResidualsOfFeature& f, const Matrix3& axes, double scale_m) {
   constexpr double kAlike = 3.0;
   struct Candidate {

@@ -13,7 +13,7 @@ namespace {
 Eigen::MatrixXd root_of_covariance(const Eigen::MatrixXd& C) {
   constexpr double kZero = 1e-12;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(C);
-  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+  const Eigen::VectorXd& values = eigen.eigenvalues();  // in ascending order
   const double least = kZero * std::max(values(values.size() - 1), 0.0);
   const Eigen::Index kept = (values.array() > least).count();
   return eigen.eigenvectors().rightCols(kept) * values.tail(kept).cwiseSqrt().asDiagonal();

@@ -14,7 +14,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Combinations of column-scaled unknowns below this value are undetermined: rounding of 300 rows.
+/// Combinations of column-scaled unknowns below this value are undetermined (rounding of 300 rows).
 constexpr double kUndetermined = 1e-11;
 
 Eigen::VectorXd column_lengths(const RowMajorRows& R) {
@@ -25,8 +25,9 @@ double least_diagonal(const RowMajorRows& R, const Eigen::VectorXd& lengths) {
   return R.diagonal().cwiseAbs().cwiseQuotient(lengths).minCoeff();
 }
 
-/// Degrees of freedom: observations less the trace of the hat matrix. A prior with the posterior
-/// standard uncertainty u' of an unknown takes (u'/u)^2 of it.
+/// Trace of the hat matrix; the degrees of freedom are the observations minus this trace. An
+/// unknown with a prior of standard uncertainty u, and u' after the adjustment, counts as 1 -
+/// (u'/u)^2.
 double trace_of_hat_matrix(const WholeSystem& system, const SharedEstimate& estimate) {
   double trace = static_cast<double>(system.shared.size());
   for (Eigen::Index k = system.shared.bar_offset(); k < system.shared.size(); ++k) {

@@ -13,7 +13,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// "ECX (u up to 1800 urad)" for each error whose uncertainty exceeds the limits.
+/// Texts such as "ECX (u up to 1800 urad)" for each error whose uncertainty exceeds the limits.
 std::vector<std::string> errors_not_shown(const Observations& o, const Eigen::VectorXd& variance,
                                           const SolveOptions& options) {
   std::vector<std::string> found;
@@ -64,7 +64,7 @@ Result<void> check_shown(const Observations& o, const Solution& solution,
   for (const std::string& error : not_shown) {
     list += (list.empty() ? "" : ", ") + error;
   }
-  // Far from 20 C the uncertainty of the expansion is that of the scales.
+  // Far from 20 C the uncertainty of the expansion causes a large uncertainty of the scales.
   const std::optional<std::string> far = bar_far_from_reference(o);
   return failure(
       ErrorCode::RankDeficient,

@@ -32,7 +32,7 @@ RowMajorRows inverse_of_upper(const RowMajorRows& R) {
 
 Eigen::MatrixXd upper_times_transpose(const RowMajorRows& X) {
   const Eigen::Index n = X.rows();
-  const RowMajorRows columns = X.transpose();  // row k: column k of X, zero behind k
+  const RowMajorRows columns = X.transpose();  // row k: column k of X, zero after element k
   RowMajorRows product = RowMajorRows::Zero(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index k = i; k < n; ++k) {

@@ -1,18 +1,20 @@
 #pragma once
-/// Tells which touch of a Multi-Feature Bar comes next, assigns each touch to its place on the bar,
-/// and finds touches that are missing, repeated or wrong. Measurement by measurement of the plan; a
-/// forward pass goes along the bar feature by feature (probing_order()), a backward pass the other
-/// way. Only the coordinates of the touches are used, no time and no command of the operator.
+/// Determines which touch of a Multi-Feature Bar comes next, assigns each touch to its place on the
+/// bar, and finds touches that are missing, repeated or wrong. The measurements follow the order of
+/// the plan. A forward pass goes along the bar feature by feature (probing_order()), a backward
+/// pass in the opposite order. Only the coordinates of the touches are used, no time and no command
+/// of the operator.
 ///
-/// The bar is clamped by hand beside its planned pose. The first touch of a pass must be the
-/// planned one; it gives the shift, and every further touch improves the pose, which tells the
-/// place of the next ones:
+/// The bar is clamped by hand near its planned pose. The first touch of a pass must be the planned
+/// one and gives the shift. Every further touch improves the pose, from which the places of the
+/// next touches are predicted:
 ///     tip = planned tip + s + w x (planned tip - O_1) + noise,   s: shift, w: rotation, both with a
 ///     normal prior; noise 0.2 mm along the normal of the surface, 1 mm along the surface
-/// So a programme and a touch by hand, up to 3 mm beside the planned point, are both assigned.
+/// Touches by a program and touches by hand, up to 3 mm beside the planned point, can thus be
+/// assigned.
 ///
-/// At the end of a pass its features, the way the bar lies and the calibrated places are checked
-/// (observe()). A pass that fails is discarded and asked for again; the passes before are kept.
+/// At the end of a pass observe() checks its features, the orientation of the bar and the
+/// calibrated places. A pass that fails is discarded and requested again; earlier passes are kept.
 /// Lengths in m, machine axes. Allocates, so not for a real-time thread; not thread-safe.
 
 #include <cstddef>
@@ -42,9 +44,9 @@ struct NextTouch {
   std::size_t planned = 0;  ///< touches planned on this feature
 };
 
-/// How a touch was used. Only Taken touches enter the result. SamePlace: made twice; Doubled:
-/// another touch at a place that has its touch; NotOnBar: at no expected place, not a number, or
-/// after the guide is complete or has failed.
+/// How a touch was used. Only Taken touches enter the result. SamePlace: the same touch made twice;
+/// Doubled: a further touch at a place that already has its touch; NotOnBar: the touch is at no
+/// expected place, is not a number, or was made after the guide was complete or failed.
 enum class TouchFate { Taken, SamePlace, Doubled, NotOnBar };
 
 struct GuidedTouch {
@@ -54,26 +56,29 @@ struct GuidedTouch {
 
 class TouchGuide {
  public:
-  /// Errors of check() for bar and plan, and of planned_observations().
+  /// Creates a guide. Errors of check() for bar and plan, and of planned_observations().
   [[nodiscard]] static Result<TouchGuide> create(Bar, Plan, MfbMachine, GuideOptions = {});
   TouchGuide(TouchGuide&&) noexcept;
   TouchGuide& operator=(TouchGuide&&) noexcept;
   ~TouchGuide();
 
-  /// `reading_m`: scale readings of X, Y, Z. To continue an interrupted session, give its readings
-  /// again in their order. Once complete() or after a failure(), no touch is taken.
+  /// Assigns a touch. `reading_m`: scale readings of X, Y, Z. To continue an interrupted session,
+  /// pass its readings again in the same order. Once complete() or after a failure(), no touch is
+  /// taken.
   [[nodiscard]] GuidedTouch take(const Vector3& reading_m);
 
   [[nodiscard]] bool complete() const;
-  /// Why the calibration is impossible: another bar, or touches that do not follow the plan.
+  /// The reason why the calibration cannot continue: another bar, or touches that do not follow the
+  /// plan.
   [[nodiscard]] const std::optional<Error>& failure() const;
-  /// Only before complete().
+  /// The touch that is expected next. Must not be called once complete().
   [[nodiscard]] NextTouch next() const;
-  /// "X3: hole 4, k = 2, 2 of 8 touches made".
+  /// Text such as "X3: hole 4, k = 2, 2 of 8 touches made".
   [[nodiscard]] std::string next_text() const;
   [[nodiscard]] std::size_t taken() const;
   [[nodiscard]] std::size_t planned() const;
-  /// One per measurement of the plan, in the order of probing; those to come are empty.
+  /// One entry per measurement of the plan, with its touches in the order of probing; future
+  /// measurements are empty.
   [[nodiscard]] const std::vector<PassTouches>& passes() const;
   [[nodiscard]] const Plan& plan() const;
 

@@ -1,9 +1,10 @@
 #pragma once
-/// Typical mistakes in the readings of a calibration with a bar, for the message if they cannot be
-/// identified: axes swapped or reversed, a wrong unit, tool offsets with the opposite sign,
-/// positions of the tip instead of scale readings, the touches of another measurement. Each is
-/// tried: a correction explains the readings if it puts every touch to within 20 mm of its planned
-/// place, more than the largest permitted difference between bar and plan. Pure.
+/// Searches typical mistakes in the readings of a calibration with a bar, for the message if the
+/// errors cannot be identified: axes swapped or reversed, a wrong unit, tool offsets with the
+/// opposite sign, positions of the tip instead of scale readings, the touches of another
+/// measurement. Each mistake is corrected on trial. A correction explains the readings if it puts
+/// every touch to within 20 mm of its planned place; this is more than the largest permitted
+/// difference between bar and plan. Pure.
 
 #include <span>
 #include <string>
@@ -12,8 +13,9 @@
 
 namespace abbe::calib::mfb {
 
-/// "; the readings fit the plan with X and Y swapped". Empty if they fit as they are, or if no
-/// correction explains them. Bar and plan are valid, one PassTouches per measurement.
+/// Text such as "; the readings fit the plan with X and Y swapped". Empty if the readings fit as
+/// they are, or if no correction explains them. Bar and plan must be valid; one PassTouches per
+/// measurement.
 [[nodiscard]] std::string corrections_to_plan(const Bar&, const Plan&,
                                               std::span<const PassTouches>);
 

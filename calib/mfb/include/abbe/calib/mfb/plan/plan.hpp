@@ -1,8 +1,8 @@
 #pragma once
-/// The set of positions with the smallest worst uncertainty (PlanPrediction::worst): beginning with
-/// a named set, positions are replaced by candidates (candidate_positions()) with as many styli
-/// while the mean uncertainty falls and the worst one does not increase. Deterministic. Units: m,
-/// rad, s.
+/// Searches the set of positions with the smallest worst uncertainty (PlanPrediction::worst). The
+/// search begins with a given set. It replaces positions by candidates (candidate_positions()) with
+/// the same number of styli, as long as the mean uncertainty decreases and the worst one does not
+/// increase. Deterministic. Units: m, rad, s.
 
 #include <functional>
 
@@ -13,26 +13,26 @@ namespace abbe::calib::mfb {
 
 struct ChoiceOptions {
   SolveOptions solve;
-  std::size_t exchanges = 60;  ///< at most
+  std::size_t exchanges = 60;  ///< largest number of exchanges
   /// Called between evaluations; true: stop.
   std::function<bool()> stopped = {};
-  std::function<void(double)> progress = {};  ///< 0 to 1
+  std::function<void(double)> progress = {};  ///< called with values from 0 to 1
 };
 
 struct ChosenSet {
   std::vector<PlannedPosition> positions;
   PlanPrediction prediction;
-  PlanPrediction start;  ///< of the set at the beginning
+  PlanPrediction start;  ///< prediction of the set at the beginning
   std::size_t candidates = 0, exchanged = 0;
 };
 
-/// Never worse than `start`, with as many positions and measurements. The errors of predict();
-/// NotConverged if stopped.
+/// Searches from `start`. The result is never worse than `start` and has the same number of
+/// positions and measurements. The errors of predict(); NotConverged if stopped.
 [[nodiscard]] Result<ChosenSet> choose_set(const PlanTask&,
                                            const std::vector<PlannedPosition>& start,
                                            const ChoiceOptions& = {});
 
-/// How the machine probes.
+/// Speeds and distances with which the machine probes.
 struct TouchDrive {
   double feed_m_per_s = 2.0 / 60.0;  ///< between touches
   double probing_feed_m_per_s = 4e-3;

@@ -1,10 +1,10 @@
 #pragma once
 /// Positions of a Multi-Feature Bar in the travel of a machine, and the sets of measurements of
-/// [Viprey 2016], adapted to travel, styli and bar. Whether a set shows the 21 errors is the matter
-/// of plan_prediction.hpp. Collisions are not considered. Units: m, rad. Pure.
+/// [Viprey 2016], adapted to travel, styli and bar. plan_prediction.hpp computes whether a set
+/// determines the 21 errors. Collisions are not considered. Units: m, rad. Pure.
 ///
-/// Roles: a, b, c are the axes from workpiece to tool. Angular errors of a and b are shown by two
-/// positions that are apart across the bar, those of c by different tools only.
+/// Roles: a, b, c are the axes from workpiece to tool. Angular errors of a and b are determined by
+/// two positions with a distance across the bar; angular errors of c only by different tools.
 
 #include <array>
 #include <optional>
@@ -20,32 +20,34 @@ struct Stylus {
   Vector3 tool_offset_m = Vector3::Zero();  ///< t: tool reference point to the centre of the tip
   Vector3 stem = -Vector3::UnitZ();         ///< unit vector from the shank to the tip
 };
-/// The stem of a stylus of a star: across the ram (last axis of the chain) if the tip is at least
-/// 20 mm beside it, else along the ram.
+/// Makes a stylus of a star. Its stem is across the ram (last axis of the chain) if the tip is at
+/// least 20 mm beside the ram, else along the ram.
 [[nodiscard]] Stylus stylus_of(const Vector3& tool_offset_m, const KinematicChain&);
 
-/// For what is planned. A stylus enters the holes along its stem from the probing side of the bar,
-/// or, where a second stylus of opposite stem is used at the same position, from the other side.
+/// Input of planning. A stylus enters the holes along its stem from the probing side of the bar. If
+/// a second stylus with the opposite stem is used at the same position, it enters from the other
+/// side.
 struct PlanTask {
   Bar bar;
   MfbMachine machine;
   std::vector<Stylus> styli;
   Plan settings;                        ///< tip, noise and gravity; without measurements
   bool backward = true;                 ///< each pass has a backward pass as its pair
-  std::optional<double> temperature_K;  ///< of all measurements
-  /// Neighbouring bars along an axis that is longer than the bar have at least this share of their
-  /// length in common: the poses of both are estimated from it.
+  std::optional<double> temperature_K;  ///< temperature of all measurements
+  /// If an axis is longer than the bar, neighbouring bars along it have at least this share of
+  /// their length in common, from which the poses of both are estimated.
   double overlap = 0.5;
 };
-/// The errors of check(Bar); BadInput for no stylus, a repeated one, a stem without length, a noise
-/// or radius of the tip that is not possible, or an overlap outside 0.1 to 0.9.
+/// Checks the task. The errors of check(Bar); BadInput for no stylus, a repeated one, a stem
+/// without length, a noise or radius of the tip that is not possible, or an overlap outside 0.1 to
+/// 0.9.
 [[nodiscard]] Result<void> check(const PlanTask&);
 
 /// One clamping of the bar and the styli that probe it.
 struct PlannedPosition {
-  std::string name;  ///< of its measurements: "X1"
+  std::string name;  ///< prefix of the names of its measurements, such as "X1"
   BarPose pose;
-  std::vector<std::size_t> styli;  ///< in PlanTask::styli
+  std::vector<std::size_t> styli;  ///< indices in PlanTask::styli
 };
 
 /// Readings of X, Y, Z at all touches of all measurements.
@@ -56,41 +58,42 @@ struct ReadingRange {
 
 enum class NamedSet {
   Paper,    ///< 17 measurements in 14 positions
-  Rolled,   ///< the same with X3 rolled by 90 degrees: smaller u of EZX and EB0Z
+  Rolled,   ///< as Paper, but X3 rolled by 90 degrees: smaller u of EZX and EB0Z
   Minimum,  ///< 12 measurements
-  Indexed,  ///< Rolled, placed about the centre of two rotary axes: 6 clampings
+  Indexed,  ///< as Rolled, placed about the centre of two rotary axes: 6 clampings
 };
 inline constexpr std::array kNamedSets{NamedSet::Paper, NamedSet::Rolled, NamedSet::Minimum,
                                        NamedSet::Indexed};
-/// "paper", "rolled", "minimum", "indexed".
+/// Returns "paper", "rolled", "minimum" or "indexed".
 [[nodiscard]] std::string_view name(NamedSet);
 [[nodiscard]] std::optional<NamedSet> set_named(std::string_view);
 
 struct PlannedSet {
   std::vector<PlannedPosition> positions;
   std::vector<std::string> notes;  ///< bars that are inclined or overlap
-  /// Measurements that are missing, and the stylus they need.
+  /// Measurements that are not possible, with the stylus they need.
   std::vector<std::string> missing;
 
-  /// Passes in one direction.
+  /// Number of passes, counted in one direction only.
   [[nodiscard]] std::size_t measurements() const;
 };
 
-/// The middle of the places that the tip of a stylus along the ram reaches.
+/// Middle of the places that the tip of a stylus along the ram can reach.
 [[nodiscard]] Vector3 middle_of_travel(const PlanTask&);
 
-/// A set, scaled to the travel. An axis longer than the bar gets several bars that overlap; along a
-/// shorter one the bar is inclined. `centre_m`: where two rotary axes cross, for NamedSet::Indexed;
-/// default: middle_of_travel(). The errors of check(); NotApplicable if a bar does not fit: the
-/// text states the travel that is needed.
+/// Places a set, scaled to the travel. An axis longer than the bar gets several bars that overlap;
+/// along a shorter axis the bar is inclined. `centre_m`: place where two rotary axes cross, for
+/// NamedSet::Indexed; default: middle_of_travel(). The errors of check(); NotApplicable if a bar
+/// does not fit: the text states the travel that is needed.
 [[nodiscard]] Result<PlannedSet> named_set(NamedSet, const PlanTask&,
                                            const std::optional<Vector3>& centre_m = {});
 
-/// More positions than any set has: bars along each axis at 3 x 3 places across it, each roll that
-/// the styli allow, one stylus or two of opposite stem, and both diagonals of each plane.
+/// Returns more positions than any set has: bars along each axis at 3 x 3 places across it, each
+/// roll that the styli allow, one stylus or two with opposite stems, and both diagonals of each
+/// plane.
 [[nodiscard]] Result<std::vector<PlannedPosition>> candidate_positions(const PlanTask&);
 
-/// The measurements of all positions in this order: each stylus forward and, with
+/// Makes the measurements of all positions in this order: each stylus forward and, with
 /// PlanTask::backward, backward. Positions get the labels P1, P2, ...; O_1 is rounded to 0.1 mm.
 [[nodiscard]] Plan plan_of(const PlanTask&, const std::vector<PlannedPosition>&);
 

@@ -1,8 +1,9 @@
 #pragma once
 /// Prediction of a calibration with a Multi-Feature Bar before it is measured: the covariance of
-/// the 21 errors follows from bar, poses, tools and noise alone (solve.hpp). Whether a plan shows
-/// an error is judged by its predicted uncertainty, never by the rank: without the diagonals the
-/// rows have full rank because of the small shifts of some holes, but squareness has 100 urad.
+/// the 21 errors follows from bar, poses, tools and noise alone (solve.hpp). A plan determines an
+/// error if its predicted uncertainty is small enough; the rank is no criterion. Example: without
+/// the diagonals the rows have full rank because of the small shifts of some holes, but squareness
+/// has an uncertainty of 100 urad.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -17,40 +18,45 @@
 namespace abbe::calib::mfb {
 
 struct ErrorUncertainty {
-  std::string name;    ///< "EXX", "EC0Y"
-  double rms_u = 0.0;  ///< over the nodes that the datum leaves free; m or rad
+  std::string name;    ///< such as "EXX", "EC0Y"
+  double rms_u = 0.0;  ///< root mean square of u over the nodes that the datum leaves free; m or
+                       ///< rad
   double max_u = 0.0;
   bool is_angle = false;
 };
 
 struct PlanPrediction {
   std::vector<ErrorUncertainty> errors;  ///< EXX .. ECZ, then EA0Z EB0Z EC0Y
-  Eigen::MatrixXd covariance;            ///< of the parameters in the order of ParameterLayout
-  std::vector<std::string> not_seen;     ///< errors beyond SolveOptions::most_u_m, most_u_rad
+  Eigen::MatrixXd covariance;            ///< covariance of the parameters in the order of
+                                         ///< ParameterLayout
+  std::vector<std::string> not_seen;     ///< errors whose uncertainty exceeds
+                                         ///< SolveOptions::most_u_m or most_u_rad
   std::size_t observations = 0, unknowns = 0, rank = 0;
-  double condition = 0.0;  ///< of the column-scaled rows, nuisances eliminated
-  /// Largest ratio of max_u to its limit: at most 1 if every error is shown.
+  double condition = 0.0;  ///< condition number of the column-scaled rows after elimination of the
+                           ///< nuisances
+  /// Largest ratio of max_u to its limit: at most 1 if the plan determines every error.
   double worst = 0.0;
 
   /// Standard uncertainty of each parameter.
   [[nodiscard]] Eigen::VectorXd u() const;
 };
 
-/// Prediction for all measurements of a plan. Errors: those of check(), and readings outside the
-/// nodes. A plan that does not show all errors is no error.
+/// Predicts the uncertainties for all measurements of a plan. Errors: those of check(), and
+/// readings outside the nodes. A plan that does not determine all errors is not an error.
 [[nodiscard]] Result<PlanPrediction> predict(const Bar&, const Plan&, const MfbMachine&,
                                              const SolveOptions& = {});
 
-/// What the passes of one position state about the unknowns that all positions share: whitened rows
-/// without the unknowns of the position. Computed once for each candidate when plans are compared.
+/// Information of the passes of one position about the unknowns that all positions share: whitened
+/// rows without the unknowns of the position. Computed once for each candidate when plans are
+/// compared.
 struct PositionInformation {
   std::string position;
   Eigen::MatrixXd rows;
   std::size_t observations = 0, nuisances = 0;
 };
 
-/// Predicts the uncertainty that positions of a bar give, for one bar, machine and noise. Immutable
-/// value; member functions may be called from any thread.
+/// Predicts the uncertainties for sets of positions of one bar, with one machine and noise.
+/// Immutable; member functions may be called from any thread.
 class PlanPredictor {
  public:
   PlanPredictor(PlanPredictor&&) noexcept;
@@ -61,7 +67,8 @@ class PlanPredictor {
   [[nodiscard]] static Result<PlanPredictor> of(const Bar&, const Plan& plan, const MfbMachine&,
                                                 const SolveOptions& = {});
 
-  /// All passes of one position; the errors of predict(). Takes about 2 ms.
+  /// Computes the information of all passes of one position. The errors of predict(). Takes about 2
+  /// ms.
   [[nodiscard]] Result<PositionInformation> position(std::span<const Measurement>) const;
   /// Prediction for a set of positions. Takes about 10 ms.
   [[nodiscard]] PlanPrediction predict(std::span<const PositionInformation* const>) const;

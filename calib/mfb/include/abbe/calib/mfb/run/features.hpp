@@ -18,9 +18,9 @@ enum class Side { Left, Right };
 
 /// The touched points of one pass along a bar.
 struct BarTouches {
-  std::vector<std::vector<Vector3>> holes_m;                  ///< N of them
-  std::vector<std::vector<Vector3>> rods_m;                   ///< N - 1: rod j after hole j
-  std::vector<std::array<std::vector<Vector3>, 2>> planes_m;  ///< N - 1, by Side
+  std::vector<std::vector<Vector3>> holes_m;                  ///< N holes
+  std::vector<std::vector<Vector3>> rods_m;                   ///< N - 1 rods: rod j after hole j
+  std::vector<std::array<std::vector<Vector3>, 2>> planes_m;  ///< N - 1 pairs, by Side
 
   /// Number of all touches: of the holes, then of the rods, then of the planes. The columns of
   /// derivatives have this order.
@@ -32,13 +32,13 @@ struct BarFeatures {
   std::vector<std::array<fit::Plane, 2>> planes;  ///< the normals point away from the bar
 };
 
-/// `axes`: approximate bar axes as columns, right-handed, orthonormal within 1e-3. BadInput: the
-/// numbers of holes, rods and planes do not belong together, there are fewer than 3 holes, a rod is
-/// not between its holes, or a plane is not on its side. Other errors are those of
-/// the fits; the text begins with the feature ("hole 3", "plane 5 L"), counted from 1.
+/// Fits all features. `axes`: approximate bar axes as columns, right-handed, orthonormal within
+/// 1e-3. BadInput: the numbers of holes, rods and planes do not belong together, there are fewer
+/// than 3 holes, a rod is not between its holes, or a plane is not on its side. Other errors are
+/// those of the fits; the text begins with the feature ("hole 3", "plane 5 L"), counted from 1.
 [[nodiscard]] Result<BarFeatures> fit_features(const BarTouches&, const Matrix3& axes);
 
-/// "hole 3", "rod 5", "plane 5 L"; `index` counts from 0.
+/// Names such as "hole 3", "rod 5", "plane 5 L"; `index` counts from 0.
 [[nodiscard]] std::string hole_name(std::size_t index);
 [[nodiscard]] std::string rod_name(std::size_t index);
 [[nodiscard]] std::string plane_name(std::size_t index, Side);

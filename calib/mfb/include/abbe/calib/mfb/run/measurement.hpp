@@ -1,6 +1,6 @@
 #pragma once
-/// The plan of a calibration with a Multi-Feature Bar, and what was touched. One measurement is one
-/// pass along the bar in one position with one tool. Lengths in m, machine axes.
+/// The plan of a calibration with a Multi-Feature Bar, and its touches. One measurement is one pass
+/// along the bar in one position with one tool. Lengths in m, machine axes.
 ///
 /// reading: scale readings of X, Y, Z; t: tool offset, tool reference point to the centre of the
 /// tip; -J of [Viprey 2016]. The centre of the tip is at reading + t.
@@ -22,34 +22,38 @@ namespace abbe::calib::mfb {
 enum class PassDirection { Forward, Backward };
 
 struct Measurement {
-  std::string name;      ///< unique
-  std::string position;  ///< measurements with the same label are of one clamping of the bar
-  Vector3 origin_m = Vector3::Zero();  ///< planned place of the centre of the tip on O_1
+  std::string name;      ///< unique name
+  std::string position;  ///< label of the clamping of the bar; measurements of one clamping have
+                         ///< the same label
+  Vector3 origin_m = Vector3::Zero();  ///< planned place of the tip's centre when the tip is at O_1
   Vector3 bar_x = Vector3::UnitX();    ///< planned bar axes in machine axes, of any length
   Vector3 bar_z = Vector3::UnitZ();
   Vector3 tool_offset_m = Vector3::Zero();
   PassDirection direction = PassDirection::Forward;
-  std::optional<double> temperature_K;  ///< of the bar; required if the bar states its expansion
+  std::optional<double> temperature_K;  ///< temperature of the bar; required if the bar states its
+                                        ///< expansion
 
   /// Planned bar axes as columns x, y, z; orthonormal if bar_x and bar_z are perpendicular.
   [[nodiscard]] Matrix3 axes() const;
 };
 
-/// A bar farther from 20 C is asked for by name: degrees Fahrenheit and typing errors are no
-/// temperatures of a workshop, and residuals show no wrong one.
+/// Largest permitted difference of the bar temperature from 20 C; a larger one must be accepted by
+/// name (bar-temperature). It is then probably in degrees Fahrenheit or a typing error. Residuals
+/// do not reveal a wrong temperature.
 inline constexpr double kMostFromReference_K = 12.0;
-/// A position is asked for by name if the bar was warmer, or colder, there than at both positions
-/// next to it in time by more than this and three times the uncertainty of its temperature.
+/// Largest permitted difference of the bar temperature at a position from both positions next to it
+/// in time, plus three times the uncertainty of the temperature. A larger one must be accepted by
+/// name (bar-temperature-change).
 inline constexpr double kMostBetweenPositions_K = 1.0;
 
 /// Standard uncertainties (k = 1).
 struct TouchNoise {
-  double probe_m = 0.0;          ///< of one touch along the normal of the surface
-  double machine_m = 0.0;        ///< of one touch in each machine axis (repeatability)
-  double u_temperature_K = 0.0;  ///< of temperature_K, one error per position
-  /// Of temperature_K, one error common to all positions: that of the thermometer. Unless stated it
-  /// is u_temperature_K: a thermometer that is wrong is wrong at every position, and all lengths
-  /// are wrong alike.
+  double probe_m = 0.0;          ///< of one touch, along the normal of the surface
+  double machine_m = 0.0;        ///< of one touch, in each machine axis (repeatability)
+  double u_temperature_K = 0.0;  ///< of temperature_K; one error per position
+  /// Standard uncertainty of the error of temperature_K that is common to all positions: that of
+  /// the thermometer. It changes all lengths by the same factor. If it is not stated,
+  /// u_temperature_K is used.
   std::optional<double> u_common_temperature_K{};
 
   [[nodiscard]] double common_temperature_K() const {
@@ -61,37 +65,40 @@ struct Plan {
   std::vector<Measurement> measurements;  ///< in the order of time
   double tip_radius_m = 0.0;
   TouchNoise noise;
-  Vector3 gravity = -Vector3::UnitZ();  ///< direction in machine axes
+  Vector3 gravity = -Vector3::UnitZ();  ///< direction of gravity in machine axes
 };
 
 /// The machine whose errors are identified.
 struct MfbMachine {
   KinematicChain chain;
-  MachineNodes nodes;  ///< of the tables of X, Y, Z; at least 4 per axis for a cubic
+  MachineNodes nodes;  ///< nodes of the tables of X, Y, Z; at least 4 per axis for a cubic
   Interpolation interpolation = Interpolation::NotAKnotCubic;
 };
 
-/// BadInput: no measurement, a name that is empty or repeated, axes that are zero or more than 1
-/// mrad from perpendicular, a position with two poses, a tool offset or radius of the tip that is
-/// not possible, a noise that is not positive, a temperature missing where the bar states its
-/// expansion. NotFinite for NaN. The text names the measurement.
+/// Checks a plan. BadInput: no measurement, a name that is empty or repeated, axes that are zero or
+/// more than 1 mrad from perpendicular, a position with two poses, a tool offset or radius of the
+/// tip that is not possible, a noise that is not positive, a temperature missing where the bar
+/// states its expansion. NotFinite for NaN. The text names the measurement.
 [[nodiscard]] Result<void> check(const Plan&, const Bar&);
 
 /// One touch of a pass.
 struct Touch {
   Target target;
-  Vector3 reading_m = Vector3::Zero();  ///< raw scale readings, nothing compensated
-  bool set_aside = false;               ///< not used; keeps its place in time
+  Vector3 reading_m = Vector3::Zero();  ///< raw scale readings without any compensation
+  bool set_aside = false;               ///< true: not used, but it keeps its place in the time of
+                                        ///< the pass
 };
 
-/// The touches of one measurement in the order of probing, at an even pace: time = index / (number
-/// of touches - 1), 0..1 in a forward pass, 1..2 in its backward pair. Touches may be missing while
-/// their feature stays determined (hole, rod: kFewestOfCylinder; plane: kFewestOfPlane).
+/// The touches of one measurement in the order of probing, at a constant rate: time = index /
+/// (number of touches - 1), 0 to 1 in a forward pass, 1 to 2 in its backward pair. Touches may be
+/// missing as long as their feature remains determined (hole, rod: kFewestOfCylinder; plane:
+/// kFewestOfPlane).
 using PassTouches = std::vector<Touch>;
 inline constexpr std::size_t kFewestOfCylinder = 6;
 inline constexpr std::size_t kFewestOfPlane = 3;
 
-/// The forward pass of which each measurement is the backward pair; nullopt: no pair.
+/// For each measurement: the index of the forward pass of which it is the backward pair; nullopt:
+/// it is not the backward pass of a pair.
 [[nodiscard]] std::vector<std::optional<std::size_t>> pairs_of(std::span<const Measurement>);
 
 }  // namespace abbe::calib::mfb

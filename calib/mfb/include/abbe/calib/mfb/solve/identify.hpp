@@ -1,11 +1,11 @@
 #pragma once
 /// Identification of the 21 ISO 230-1 errors of three linear axes with a Multi-Feature Bar:
-/// observe(), solve(), and the judgement of the residuals. Touches far from their feature are set
-/// aside: touches are corrected by the identified errors of the machine, and a feature whose
-/// residuals exceed SetAsideOptions::limit times the noise of a touch is searched; of its touches
-/// the one is excluded without which chi-square is smallest, because opposite touches of a hole
-/// have the same residuals. Raw residuals would not do: a good hole on a diagonal shows the shear
-/// of the machine.
+/// observe(), solve(), and the search for wrong touches. The touches are first corrected by the
+/// identified errors of the machine. (Without this correction a good hole on a diagonal would have
+/// large residuals, because the machine's shear deforms it.) A feature is searched if its residuals
+/// exceed SetAsideOptions::limit times the noise of a touch. Opposite touches of a hole have the
+/// same residuals. The touch that is set aside (excluded) is therefore the one without which
+/// chi-square is smallest.
 
 #include <cstddef>
 #include <string>
@@ -22,9 +22,10 @@ struct SetAsideOptions {
   /// Residuals of a feature (root of the squares per degree of freedom) relative to the noise of a
   /// touch, or to the median of the features of its kind if that is larger (form errors).
   double limit = 5.0;
-  /// More touches than this share of a pass are not single outliers: the rest is left in.
+  /// Largest share of the touches of a pass that may be set aside. If more are wrong, they are not
+  /// single outliers, and the others are used.
   double most_of_pass = 0.02;
-  /// The same for all passes together.
+  /// Largest share of the touches of all passes that may be set aside.
   double most_of_all = 0.01;
 };
 
@@ -35,30 +36,31 @@ struct Options {
 };
 
 struct SetAsideTouch {
-  std::size_t measurement = 0;  ///< in the plan
+  std::size_t measurement = 0;  ///< index in the plan
   std::string measurement_name;
   Target target;
-  double residual_m = 0.0;  ///< along the normal, from the feature without this touch
+  double residual_m = 0.0;  ///< along the normal, distance from the feature that is fitted without
+                            ///< this touch
 };
 
 /// Distance of a touch from the least-squares feature of its pass, along the outward normal, after
-/// the errors of the machine were taken out.
+/// the machine errors have been subtracted.
 struct TouchResidual {
-  std::size_t measurement = 0;  ///< in the plan
+  std::size_t measurement = 0;  ///< index in the plan
   Target target;
   double residual_m = 0.0;
-  bool set_aside = false;  ///< then the feature is that without this touch
+  bool set_aside = false;  ///< true: the feature was fitted without this touch
 };
 
 enum class Cause { None, Drift, Hole, Measurement, Unknown };
-/// "none", "drift", "hole", "measurement", "unknown": for files.
+/// Name for files: "none", "drift", "hole", "measurement" or "unknown".
 [[nodiscard]] std::string_view name(Cause);
 
-/// Why chi-square is too large: the alternative that explains it best.
+/// The alternative that best explains a chi-square above its limit.
 struct LikelyCause {
   Cause cause = Cause::None;
   std::string text;                   ///< one sentence with numbers and what to do; empty for None
-  double chi2_per_dof_without = 0.0;  ///< with the alternative
+  double chi2_per_dof_without = 0.0;  ///< chi-square per degree of freedom under this alternative
 };
 
 struct Identification {
@@ -68,8 +70,8 @@ struct Identification {
   /// of the touched readings inside the nodes: every error is determined at every node.
   VolumetricModel model;
   std::vector<SetAsideTouch> set_aside;
-  /// Features whose touches do not fit together, but too many are wrong or missing to find out
-  /// which: "X2: hole 3". Their touches are used.
+  /// Features whose touches do not fit together, but too many are wrong or missing to find the
+  /// wrong ones. Their touches are used. Such as "X2: hole 3".
   std::vector<std::string> unresolved_features;
   std::vector<TouchResidual> touch_residuals;
   double u_touch_m = 0.0;  ///< standard uncertainty of a touch along the normal
@@ -77,7 +79,8 @@ struct Identification {
   std::vector<std::string> notes;  ///< further sentences for the report
 };
 
-/// The errors of observe() and solve(). Pure and deterministic: the same input gives the same bits.
+/// Identifies the errors. Returns the errors of observe() and solve(). Pure and deterministic: the
+/// same input gives the same bits.
 [[nodiscard]] Result<Identification> identify(const Bar&, const Plan&, std::span<const PassTouches>,
                                               const MfbMachine&, const Options& = {});
 

@@ -16,25 +16,29 @@ namespace abbe::calib::mfb {
 
 /// Deviations M of the points of interest of one pass, one per hole, in the axes of the machine,
 /// after end-point levelling; x without the nominal position, y without the nominal shift of the
-/// hole, which has the opposite sign in a reversed pass. m.
+/// hole, which has the opposite sign in a reversed pass. In m.
 using BarPass = std::vector<Vector3>;
 
 struct ReversalRuns {
-  std::vector<BarPass> normal, reversed;  ///< the same number of repeats of each
+  std::vector<BarPass> normal, reversed;  ///< the same number of repeats of both
   std::vector<double> machine_x_m;        ///< E_XX of the machine at each hole, on the bar's line
-  std::vector<double> u_machine_x_m;  ///< its standard uncertainty; empty: not known, counts as 0
+  std::vector<double> u_machine_x_m;  ///< standard uncertainty of machine_x_m; empty: not known,
+                                      ///< counts as 0
 };
 
 struct CalibratedBar {
   std::vector<Vector3> error_m;        ///< E_x, E_y, E_z of each hole
-  std::vector<Vector3> u_m;            ///< standard uncertainty; x: of the mean and of E_XX
-  std::vector<Vector3> u_mean_m;       ///< of the mean of the repeats alone (type A)
-  std::size_t degrees_of_freedom = 0;  ///< of u_mean_m: for the coverage factor of Student's t
+  std::vector<Vector3> u_m;            ///< standard uncertainty of error_m; x contains the mean and
+                                       ///< E_XX
+  std::vector<Vector3> u_mean_m;       ///< standard uncertainty of the mean of the repeats alone
+                                       ///< (type A)
+  std::size_t degrees_of_freedom = 0;  ///< degrees of freedom of u_mean_m, for Student's t
   std::vector<Vector3> machine_m;      ///< errors of the machine along the bar; x: E_XX
 };
 
-/// TooFewObservations below 2 repeats; BadInput below 2 holes, if the numbers of repeats or holes
-/// differ, or an uncertainty is negative; NotFinite. The text names pass and hole, counted from 1.
+/// Computes the shape of the bar. TooFewObservations below 2 repeats; BadInput below 2 holes, if
+/// the numbers of repeats or holes differ, or an uncertainty is negative; NotFinite. The text names
+/// pass and hole, counted from 1.
 [[nodiscard]] Result<CalibratedBar> calibrate_by_reversal(const ReversalRuns&);
 
 }  // namespace abbe::calib::mfb

@@ -1,6 +1,6 @@
 #pragma once
-/// Points of interest from the features of a bar, without derivatives (points_of_interest.hpp,
-/// steps 1 to 4).
+/// Points of interest and pose, computed from the features of a bar without derivatives
+/// (points_of_interest.hpp, steps 1 to 4).
 
 #include <span>
 #include <vector>
@@ -27,7 +27,7 @@ struct BarPoints {
 struct PointAndDirection {
   Vector3 point = Vector3::Zero(), direction = Vector3::UnitZ();
 };
-/// planes: two per rod, L before R. `up`: approximate z of the bar.
+/// `planes`: two per rod, L before R. `up`: approximate z of the bar.
 [[nodiscard]] Result<BarPoints> bar_points(std::span<const PointAndDirection> holes,
                                            std::span<const PointAndDirection> rods,
                                            std::span<const PointAndDirection> planes,

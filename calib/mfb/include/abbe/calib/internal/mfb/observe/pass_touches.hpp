@@ -1,5 +1,5 @@
 #pragma once
-/// The touches of one pass, sorted by feature, and what the features must look like.
+/// Sorts the touches of one pass by feature and checks the features against the bar.
 
 #include <vector>
 
@@ -8,30 +8,32 @@
 
 namespace abbe::calib::mfb {
 
-/// The used touches of a pass in the fixed order.
+/// The used touches of a pass, in the order of nominal_touches() (the fixed order).
 struct SortedTouches {
-  std::vector<std::size_t> place;  ///< in nominal_touches(), ascending
+  std::vector<std::size_t> place;  ///< index in nominal_touches(), ascending
   std::vector<Vector3> tip_m;      ///< reading + tool offset
-  std::vector<double> time;        ///< 0..1
+  std::vector<double> time;        ///< 0 to 1 within the pass
 };
 
-/// BadInput for a touch that the pattern does not have or a repeated one, NotFinite,
-/// TooFewObservations for a feature with too few touches; the text begins with the name of the
-/// measurement.
+/// Sorts the touches. BadInput for a touch that the pattern does not have or a repeated one,
+/// NotFinite, TooFewObservations for a feature with too few touches; the text begins with the name
+/// of the measurement.
 [[nodiscard]] Result<SortedTouches> sorted_touches(const TouchPattern&, const Measurement&,
                                                    const PassTouches&);
 
-/// The features of the pattern with the touches at these places; one point per place.
+/// The features of the pattern with the touches at these places (one point per place).
 [[nodiscard]] BarTouches bar_touches(const TouchPattern&, std::span<const std::size_t> places,
                                      std::span<const Vector3> points_m);
 
-/// NotApplicable if a radius differs from the nominal one by more than the limits, or a feature is
-/// elsewhere in the frame of the bar. Text: "hole 3: ...".
+/// Compares the fitted features with the pattern. NotApplicable if a radius differs from the
+/// nominal one by more than the limits, or if a feature is at another place in the frame of the
+/// bar. The text begins with the feature, such as "hole 3: ...".
 [[nodiscard]] Result<void> check_features(const BarFeatures&, const TouchPattern&,
                                           double tip_radius_m, const BarPose&,
                                           const ObserveLimits&);
 
-/// The frame of the bar as points_of_interest() finds it, and O_i in the frame of the touches.
+/// Features of a bar, its frame as points_of_interest() defines it, and the points O_i in the frame
+/// of the touches.
 struct ExtractedBar {
   BarFeatures features;
   std::vector<Vector3> O_m;

@@ -1,7 +1,7 @@
 #pragma once
-/// Points of interest for many repetitions: no checks, no covariance, fits that begin at the
-/// nominal feature. The touches are those of a bar that is nearly where the pattern has it; the
-/// result differs from that of points_of_interest() by rounding.
+/// Computes points of interest in little time, for many repetitions: without checks and covariance,
+/// with fits that start at the nominal feature. The bar must be nearly where the pattern has it.
+/// The result differs from that of points_of_interest() only by rounding.
 
 #include <span>
 #include <vector>
@@ -13,10 +13,11 @@ namespace abbe::calib::mfb {
 
 class QuickExtraction {
  public:
-  /// `places`: the touches that are used, in the fixed order.
+  /// `places`: indices of the used touches in the fixed order (nominal_touches()).
   QuickExtraction(const TouchPattern&, double tip_radius_m, std::span<const std::size_t> places);
 
-  /// `tips_m`: one per place, in bar axes. DegenerateGeometry: the axes do not meet the planes.
+  /// Computes the points. `tips_m`: one per place, in bar axes. DegenerateGeometry: the axes do not
+  /// meet the planes.
   [[nodiscard]] Result<BarPoints> operator()(std::span<const Vector3> tips_m);
 
  private:

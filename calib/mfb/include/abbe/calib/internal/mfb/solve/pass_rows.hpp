@@ -4,7 +4,7 @@
 /// 0 to 2: displacement of the bar [m], 3 to 5: rotation about the middle of the bar [rad],
 /// then for each further tool its 3 constants [m],
 /// then for each pair 3 rates of drift and 3 constants of the second pass [m],
-/// then, for the search of a cause, 3 rates of every pass without a pair [m],
+/// then, only for the search of a cause, 3 rates of every pass without a pair [m],
 /// then the error of the temperature [K].
 
 #include <vector>
@@ -16,9 +16,10 @@ namespace abbe::calib::mfb {
 inline constexpr Eigen::Index kRollUnknown = 3;
 
 struct NuisanceLayout {
-  Eigen::Index tools = 6, pairs = 6, rates = 6, temperature = 6;  ///< index of the first of each
+  /// index of the first unknown of each kind
+  Eigen::Index tools = 6, pairs = 6, rates = 6, temperature = 6;
   Eigen::Index size = 6;
-  /// Standard uncertainty of the prior of each unknown, kNoPrior without.
+  /// Standard uncertainty of the prior of each unknown; kNoPrior: no prior.
   std::vector<double> u;
 
   [[nodiscard]] bool has_temperature() const { return size > temperature; }
@@ -26,8 +27,9 @@ struct NuisanceLayout {
 
 struct NuisanceOptions {
   double u_roll_rad = 100e-6;
-  bool drift = true;                    ///< of pairs
-  double u_rate_of_every_pass_m = 0.0;  ///< prior; 0: passes without a pair have no drift
+  bool drift = true;                    ///< pairs have unknown rates of drift
+  double u_rate_of_every_pass_m = 0.0;  ///< prior of the rates of passes without a pair; 0: these
+                                        ///< passes have no drift
 };
 [[nodiscard]] NuisanceLayout nuisance_layout(const Observations&, std::size_t position,
                                              const NuisanceOptions&);
@@ -35,10 +37,11 @@ struct NuisanceOptions {
 /// The passes of a position, as indices in Observations::passes.
 [[nodiscard]] std::vector<std::size_t> passes_of(const Observations&, std::size_t position);
 
-/// 3N rows by the free parameters, the bar and alpha.
+/// Matrix with 3N rows; columns: free parameters, bar, alpha and temperature (SharedUnknowns).
 [[nodiscard]] RowMajorRows shared_rows(const Observations&, const PassObservation&,
                                        const SharedUnknowns&);
-/// 3N rows by the unknowns of the position. `number`: of the pass in its position.
+/// Matrix with 3N rows; columns: unknowns of the position. `number`: index of the pass in its
+/// position.
 [[nodiscard]] Eigen::MatrixXd nuisance_rows(const Observations&, const PassObservation&,
                                             std::size_t number, const NuisanceLayout&,
                                             const NuisanceOptions&);

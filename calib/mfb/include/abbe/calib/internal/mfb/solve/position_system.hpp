@@ -1,8 +1,8 @@
 #pragma once
-/// The whitened rows of one position [A | L | y] and their elimination: with the priors of the
-/// nuisances c as further rows, an orthogonal Q gives
+/// The whitened rows of one position [A | L | y], and the elimination of its nuisances c. The
+/// priors of c are added as further rows. An orthogonal Q then gives
 ///     Q^T [A L y] = [G R z]      c = R^-1 (z - G x), x: shared unknowns
-///                   [E 0 e]      what the position states about x
+///                   [E 0 e]      rows about x alone
 
 #include <Eigen/Cholesky>
 #include <vector>
@@ -18,8 +18,9 @@ using RootOfNoise = Eigen::LLT<Eigen::MatrixXd>;
 [[nodiscard]] Result<RootOfNoise> root_of_noise(const TouchNoise&, const PassObservation&);
 
 struct PositionSystem {
-  std::vector<std::size_t> passes;  ///< in Observations::passes; their rows follow each other
-  std::vector<RootOfNoise> root;    ///< of each pass
+  std::vector<std::size_t> passes;  ///< indices in Observations::passes; their rows follow each
+                                    ///< other
+  std::vector<RootOfNoise> root;    ///< for each pass
   NuisanceLayout layout;
   Eigen::Index rows_of_pass = 0;
   RowMajorRows A;     ///< whitened, data only
@@ -31,19 +32,20 @@ struct PositionSystem {
   Eigen::MatrixXd E;
   Eigen::VectorXd e;
 
-  /// The nuisances for given shared unknowns.
+  /// Estimates of the nuisances for given shared unknowns x.
   [[nodiscard]] Eigen::VectorXd nuisances(const Eigen::VectorXd& x) const;
 };
 
-/// RankDeficient if the rows do not determine the nuisances.
+/// Computes the system of a position. RankDeficient if the rows do not determine the nuisances.
 [[nodiscard]] Result<PositionSystem> position_system(const Observations&, std::size_t position,
                                                      const SharedUnknowns&, const NuisanceOptions&);
 
-/// E^T Q_E^T W as a matrix of the data: shared unknowns x data rows, W: whitening. With the
-/// covariance C of the shared unknowns, C times it is the derivative of x by delta.
+/// The matrix E^T Q_E^T W (shared unknowns x data rows), Q_E: columns of Q that belong to E, W:
+/// whitening. Its product with the covariance C of the shared unknowns is the derivative of x by
+/// delta.
 [[nodiscard]] Eigen::MatrixXd gain_rows(const PositionSystem&);
 
-/// The priors of the shared unknowns.
+/// Adds the priors of the shared unknowns.
 void add_shared_priors(estimation::Information&, const SharedUnknowns&);
 
 }  // namespace abbe::calib::mfb

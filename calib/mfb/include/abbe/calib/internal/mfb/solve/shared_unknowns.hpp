@@ -1,10 +1,11 @@
 #pragma once
 /// The unknowns that all positions of the bar share:
-/// 1. the parameters of the model that datum G2 leaves free: with the conditions K U = 0 of each
-///    table one of its nodes is expressed by the others, in general it is zero,
-/// 2. the calibration of the bar, as g with dO = F g, F F^T = covariance, g ~ N(0, 1),
-/// 3. the error of alpha in units of its uncertainty, ~ N(0, 1),
-/// 4. the error of the temperatures that is common to all positions, likewise.
+/// 1. the parameters of the model that datum G2 leaves free: the conditions K U = 0 of each table
+/// express one of its nodes by the others (in general this node is zero),
+/// 2. the error of the calibration of the bar, as g with dO = F g, F F^T = covariance, g ~ N(0, 1),
+/// 3. the error of alpha, divided by its standard uncertainty, ~ N(0, 1),
+/// 4. the error of the temperatures that is common to all positions, divided by its standard
+/// uncertainty, ~ N(0, 1).
 
 #include <Eigen/Core>
 #include <vector>
@@ -27,16 +28,17 @@ class SharedUnknowns {
   [[nodiscard]] Eigen::Index alphas() const { return u_alpha_per_K_ > 0.0 ? 1 : 0; }
   [[nodiscard]] Eigen::Index temperature_offset() const { return alpha_offset() + alphas(); }
   [[nodiscard]] Eigen::Index temperatures() const { return growth_of_temperature_ > 0.0 ? 1 : 0; }
-  /// Relative growth of all lengths of the bar for the uncertainty of the common temperature.
+  /// Relative change of all lengths of the bar by one standard uncertainty of the common
+  /// temperature.
   [[nodiscard]] double growth_of_temperature() const { return growth_of_temperature_; }
   [[nodiscard]] const Eigen::MatrixXd& bar_root() const { return bar_root_; }
   [[nodiscard]] double u_alpha_per_K() const { return u_alpha_per_K_; }
 
-  /// The columns of the free parameters from those of all parameters of the model.
+  /// Computes the columns of the free parameters from those of all parameters of the model.
   void reduce(const RowMajorRows& of_model, Eigen::Ref<RowMajorRows> free) const;
-  /// The free parameters of a vector of all parameters that meets the conditions.
+  /// The free parameters from a vector U of all parameters that satisfies the conditions.
   [[nodiscard]] Eigen::VectorXd free_of(const Eigen::VectorXd& U) const;
-  /// All parameters of the model from the free ones: rows of X.
+  /// Rows for all parameters of the model from the rows X of the free ones.
   [[nodiscard]] Eigen::MatrixXd expanded(const Eigen::MatrixXd& X) const;
 
  private:

@@ -1,6 +1,5 @@
 #pragma once
-/// The simultaneous adjustment (solve.hpp) in parts that observe, plan and Monte Carlo have in
-/// common.
+/// The simultaneous adjustment (solve.hpp) as separate functions for observe, plan and Monte Carlo.
 
 #include <vector>
 
@@ -22,7 +21,7 @@ struct SharedEstimate {
   RowMajorRows root;  ///< upper triangle; covariance = root root^T
   Eigen::MatrixXd covariance;
   double rest = 0.0;       ///< sum of squares of the residuals of observations and priors
-  std::size_t defect = 0;  ///< combinations that the data leave undetermined
+  std::size_t defect = 0;  ///< number of combinations that the data leave undetermined
   double condition = 0.0;
 };
 /// `data` contains the priors of the shared unknowns. Undetermined combinations get a prior of 1 m

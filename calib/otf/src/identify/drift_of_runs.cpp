@@ -18,8 +18,8 @@ namespace {
 
 using Columns = std::vector<std::size_t>;
 
-/// The added unknowns of all runs: the range offset of each run if it has a prior, then the drift
-/// of each run that has one.
+/// The additional unknowns of all runs: the range offset of each run if it has a prior, then the
+/// drift of each run that has one.
 class DriftUnknowns {
  public:
   explicit DriftUnknowns(std::span<const Observations> runs) {
@@ -39,9 +39,10 @@ class DriftUnknowns {
   }
 
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] std::size_t offsets() const { return offsets_; }  ///< of each run: 1 or 0
+  /// number of range offsets of each run: 1 or 0
+  [[nodiscard]] std::size_t offsets() const { return offsets_; }
   [[nodiscard]] const Columns& of_run(std::size_t run) const { return of_run_[run]; }
-  /// The range offset and the drift of a run: the columns of its rows.
+  /// Indices of the range offset and the drift of a run: unknowns on which its rows depend.
   [[nodiscard]] const Columns& seen_by(std::size_t run) const { return seen_by_[run]; }
   [[nodiscard]] Columns others(std::size_t run) const {
     Columns out;
@@ -54,12 +55,12 @@ class DriftUnknowns {
   }
 
  private:
-  std::size_t offsets_ = 0;  ///< of each run
+  std::size_t offsets_ = 0;  ///< number of range offsets of each run
   std::size_t size_ = 0;
   std::vector<Columns> of_run_, seen_by_;
 };
 
-/// Sums of the columns of one run for its own unknowns.
+/// Sums of the additional columns of one run, for its own additional unknowns only.
 AddedColumns sums_of_run(const Observations& o, std::span<const double> residual_m,
                          std::size_t offsets, DriftColumns::BetweenKnots between) {
   if (o.drift) {
@@ -73,13 +74,14 @@ AddedColumns sums_of_run(const Observations& o, std::span<const double> residual
   return sums;
 }
 
-/// What visits and priors tell about the added unknowns.
+/// Information of visits and priors about the additional unknowns d: matrix P and vector P c.
 struct OwnInformation {
   Eigen::MatrixXd P;
   Eigen::VectorXd Pc;
 };
 
-/// Each range offset has its prior, every drift at first one so wide that it tells nothing.
+/// Start values: each range offset has its prior; every drift has a prior that is so wide that it
+/// has almost no information.
 OwnInformation first_information(std::span<const Observations> runs, const DriftUnknowns& added) {
   constexpr double kWide_m = 100e-6;
   const auto n = static_cast<Eigen::Index>(added.size());
@@ -92,8 +94,8 @@ OwnInformation first_information(std::span<const Observations> runs, const Drift
   return own;
 }
 
-/// Estimates the drift of one run beside the others, and replaces what its visits and its prior
-/// tell.
+/// Estimates the drift of one run, given the information about the others. Then replaces the
+/// information of its visits and its prior in `own`.
 Result<DriftEstimate> estimate_beside(const DriftObservations& d, const Columns& mine,
                                       const Columns& others, const Eigen::MatrixXd& S,
                                       const Eigen::VectorXd& g, OwnInformation& own,
@@ -111,7 +113,8 @@ Result<DriftEstimate> estimate_beside(const DriftObservations& d, const Columns&
   if (!e) {
     return e;
   }
-  constexpr double kResolved_m = 1e-9;  // a drift is smooth: its covariance is nearly singular
+  constexpr double kResolved_m = 1e-9;  // a drift is smooth, so that its covariance is nearly
+                                        // singular
   Eigen::MatrixXd V = e->covariance;
   V.diagonal().array() += kResolved_m * kResolved_m;
   const Eigen::LDLT<Eigen::MatrixXd> posterior(V);
@@ -122,7 +125,7 @@ Result<DriftEstimate> estimate_beside(const DriftObservations& d, const Columns&
   return e;
 }
 
-/// What all that is known tells about the added unknowns.
+/// Estimate of the additional unknowns from all information.
 struct AllDrifts {
   Eigen::VectorXd d;
   Eigen::MatrixXd covariance;
@@ -160,7 +163,7 @@ Result<AllDrifts> estimate_all(std::span<const Observations> runs, const DriftUn
   return all;
 }
 
-/// The adjustment of all runs with the added unknowns.
+/// The adjustment of all runs with the additional unknowns.
 class AddedToRuns {
  public:
   AddedToRuns(std::span<const Observations> runs, const Adjustment& a,
@@ -176,7 +179,7 @@ class AddedToRuns {
   [[nodiscard]] const DriftUnknowns& added() const { return added_; }
   [[nodiscard]] const AddedColumns::Reduced& reduced() const { return reduced_; }
 
-  /// By run: y - A U without the added unknowns d.
+  /// Residuals of each run: y - A U, after subtraction of the effect of the additional unknowns d.
   [[nodiscard]] std::vector<std::vector<double>> residuals_without_m(
       const Eigen::VectorXd& U, const Eigen::VectorXd& d) const {
     std::vector<std::vector<double>> all;
@@ -195,8 +198,9 @@ class AddedToRuns {
     return all;
   }
 
-  /// What the course of the drift of a run between its knots adds to the covariance of U
-  /// (with_drift.cpp). `covariance`: of the added unknowns, `factor`: of the variance of the rows.
+  /// Additional covariance of U because the drift of a run is not straight between its knots
+  /// (with_drift.cpp). `covariance`: that of the additional unknowns, `factor`: that of the
+  /// variance of the rows.
   [[nodiscard]] Eigen::MatrixXd covariance_between_knots(std::size_t run, double walk_m,
                                                          const Eigen::MatrixXd& covariance,
                                                          double factor) const {
@@ -210,7 +214,8 @@ class AddedToRuns {
   }
 
  private:
-  /// Sums of all runs; with the columns between the knots of one of them behind the others.
+  /// Sums of all runs. If `between` is given, the columns between the knots of this run follow the
+  /// others.
   [[nodiscard]] AddedColumns sums_with(std::size_t columns,
                                        std::optional<std::size_t> between = {}) const {
     AddedColumns all(columns, unknowns_.size());

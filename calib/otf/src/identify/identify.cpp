@@ -26,8 +26,9 @@ Options after_linearisation(Options options) {
   return options;
 }
 
-/// solve(), with the prior for smooth tables that these rows permit, if there is one. The bends are
-/// judged without the drift and the range offset that the fit without a prior shows.
+/// solve() with a prior for smooth tables, if one is requested: the prior is left out where these
+/// rows contradict it. For this test the drift and the range offset from the fit without a prior
+/// are subtracted.
 Result<Solution> solve_smooth(Observations& o, const RowInformation& rows, const Options& options) {
   Result<Solution> solution = solve(o, rows, options);
   if (!o.smoothness || !solution) {
@@ -90,7 +91,8 @@ Observations with_smoothness(Observations o, const Options& options) {
   return o;
 }
 
-/// Adds the legs that were not used because of backlash: the rest may be insufficient without them.
+/// Adds to an error text the legs that were not used because of backlash, because they may be its
+/// cause.
 auto naming_unused(const Observations& o) {
   return [unused = note_on_unused(o)](Error error) {
     if (!unused.empty()) {

@@ -13,7 +13,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Standstill mode: standstills apart from the visits of nests.
+/// Observations in standstill mode, without the standstills at nests.
 Result<Observations> observe_standing(std::span<const TrackerObservation> samples,
                                       const Machine& machine, const Path& path, const Noise& noise,
                                       const Options& options) {

@@ -11,26 +11,27 @@
 
 namespace abbe::calib::otf {
 
-/// Observations of all runs, and the segments they are made of (empty in standstill mode).
+/// Observations of all runs, and the segments from which they are made (empty in standstill mode).
 struct ObservedRuns {
   std::vector<Observations> observations;
   std::vector<SegmentSeries> series;
 };
 
-/// NotFinite; DegenerateGeometry if the offsets are on a line.
+/// Checks the target offsets. NotFinite; DegenerateGeometry if the offsets are on a line.
 [[nodiscard]] Result<void> check_targets(std::span<const TargetRun> runs);
 
-/// An error of observe() or aligned_segments() names its run.
+/// Computes the observations of all runs. An error of observe() or aligned_segments() names its
+/// run.
 [[nodiscard]] Result<ObservedRuns> observe_runs(std::span<const TargetRun> runs,
                                                 const Machine& machine, const Noise& noise,
                                                 const Options& options);
 
 [[nodiscard]] std::size_t rows_of_runs(std::span<const Observations> runs);
 
-/// Of all rows, without priors.
+/// Information of all rows, without priors.
 [[nodiscard]] estimation::Information rows_information(std::span<const Observations> runs);
 
-/// `runs` must outlive the result.
+/// Options of the adjustment of all runs. `runs` must outlive the result.
 [[nodiscard]] estimation::DatumOptions datum_options(std::span<const Observations> runs,
                                                      const Options& options);
 

@@ -17,14 +17,15 @@ bool is_along(const Observation& row) {
   return row.component == kAlong;
 }
 
-/// Noise of the rows of one kind relative to their uncertainties.
+/// Noise of the rows of one kind (along or across the travel) relative to their uncertainties.
 struct NoiseOfRows {
   std::size_t rows = 0;
   double degrees_of_freedom = 0.0;
   ResidualNoise noise;
 };
 
-/// Rows less the part of the unknowns that they determine, trace(Q A^T W^2 A).
+/// Degrees of freedom of the rows: their number minus the part of the unknowns that they determine,
+/// trace(Q A^T W^2 A).
 double freedom(const Identification& id, bool along, std::size_t rows) {
   const RowInformation information = information_of(
       id.observations, [&](const Observation& row) { return is_along(row) == along; });
@@ -43,7 +44,7 @@ NoiseOfRows noise_along(const Identification& id) {
   return of;
 }
 
-/// Variance of the rows across the travel relative to the stated one, at least 1.
+/// Variance of the rows across the travel, relative to the stated variance; at least 1.
 double variance_across(const Identification& id) {
   const Observations& o = id.observations;
   const auto rows = o.rows.size() -
@@ -66,16 +67,15 @@ Result<Identification> without_along(const std::string& why,
   return id;
 }
 
-/// Segments whose row along the travel is off by seven standard deviations, while those of most
-/// segments beside them are not: what is wrong for longer is a fault of the readings and no
-/// outlier.
-/// Empty if more than 5 % of the rows are off.
+/// Outliers: segments whose row along the travel deviates by seven standard deviations, while the
+/// rows of most neighbouring segments do not. (A longer deviation is a fault of the readings and
+/// not an outlier.) Empty if more than 5 % of the rows deviate.
 std::vector<std::size_t> segments_off(const Identification& id) {
   constexpr double kOff = 7.0, kMostShare = 0.05;
   constexpr std::size_t kLongest = 3;
   const Observations& o = id.observations;
   std::vector<std::size_t> segments;
-  std::vector<double> times;  // standard deviations
+  std::vector<double> times;  // in units of the standard deviation
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (is_along(o.rows[i])) {
       segments.push_back(o.rows[i].segment);
@@ -137,8 +137,8 @@ Synchronisation synchronisation_of(const Identification& id, const EncoderLog& l
   return s;
 }
 
-/// A linear adjustment corrects the clock once; the log is interpolated at the corrected time, and
-/// the adjustment is repeated.
+/// Estimates with a corrected clock. A linear adjustment corrects the clock once; then the log is
+/// interpolated at the corrected time, and the adjustment is repeated.
 Result<Identification> at_corrected_clock(
     AlongRows& along, const Options& options,
     const std::function<Result<Identification>(AlongRows*)>& estimate) {
@@ -167,7 +167,7 @@ Result<Identification> identify_synchronised(
   ABBE_TRY(clock);
 
   AlongRows along(log, *clock);
-  constexpr std::size_t kFewestRows = 30;  // fewer do not show their own noise
+  constexpr std::size_t kFewestRows = 30;  // fewer rows are not enough to estimate their own noise
   const Observations first = along.added_to(across, series, noise);
   const std::size_t rows = first.rows.size() - across.rows.size();
   if (rows < kFewestRows) {

@@ -32,7 +32,8 @@ std::vector<Residuals> residuals_of_runs(std::span<const Observations> runs,
   return all;
 }
 
-/// The adjustment of all runs for the unknowns of one. Its rank is the share of its rows.
+/// The part of the adjustment of all runs for the unknowns of one run. Its rank is that of all runs
+/// times the share of its rows.
 Adjustment adjustment_of_run(const Adjustment& of_all, std::span<const Observations> runs,
                              std::size_t run) {
   const RunUnknowns unknowns(runs);
@@ -105,7 +106,7 @@ std::vector<Statistics> statistics_of_runs(std::span<const Observations> runs, c
   return all;
 }
 
-/// The entries of a row at their places among the unknowns of all runs.
+/// The entries of a row with their indices among the unknowns of all runs.
 std::vector<SparseRows::Entry> entries_at(std::span<const SparseRows::Entry> row,
                                           std::span<const std::size_t> at) {
   std::vector<SparseRows::Entry> entries(row.begin(), row.end());
@@ -115,7 +116,7 @@ std::vector<SparseRows::Entry> entries_at(std::span<const SparseRows::Entry> row
   return entries;
 }
 
-/// The offset of the ranges of each run, with its prior.
+/// Estimates the range offset of each run, with its prior.
 AddedColumns::Estimate estimate_offsets(std::span<const Observations> runs, const Adjustment& a,
                                         std::span<const Residuals> residuals, double factor) {
   const RunUnknowns unknowns(runs);
@@ -170,7 +171,7 @@ Result<VolumetricModel> model_of_runs(std::span<const Observations> runs, const 
   });
 }
 
-/// The misfit that the residuals of all runs show together.
+/// Finds the misfit in the residuals of all runs together.
 std::optional<FoundMisfit> misfit_of_runs(std::span<const Observations> runs,
                                           std::span<const Residuals> residuals,
                                           const Statistics& statistics,
@@ -195,14 +196,14 @@ Result<Adjustment> adjust_runs(std::span<const Observations> runs, const Options
   return a;
 }
 
-/// What an adjustment of the rows states, with the offsets of the ranges and the drift of the
-/// tracker as further unknowns.
+/// Result of an adjustment of the rows, with the offsets of the ranges and the drift of the tracker
+/// as additional unknowns.
 struct FitOfRuns {
   Eigen::VectorXd U;
-  std::vector<RangeOffset> offset;                 ///< by run; 0 without a prior
+  std::vector<RangeOffset> offset;                 ///< by run; 0 if the offset has no prior
   std::vector<std::optional<TrackerDrift>> drift;  ///< by run
-  Eigen::MatrixXd added_covariance;  ///< what range offsets and drifts add to that of U
-  std::vector<Residuals> residuals;  ///< without offset and drift, as all figures
+  Eigen::MatrixXd added_covariance;  ///< covariance of U that is caused by range offsets and drifts
+  std::vector<Residuals> residuals;  ///< after subtraction of offset and drift, as all statistics
   std::vector<Statistics> of_runs;
   Statistics all;
 };
@@ -266,9 +267,9 @@ Result<FitOfRuns> fit_of_runs(std::span<const Observations> runs, const Adjustme
   return fit;
 }
 
-/// adjust_runs(), with the prior for smooth tables that the rows of all runs permit, if there is
-/// one. The bends are judged without the range offsets and the drift that the fit without a prior
-/// shows.
+/// adjust_runs() with a prior for smooth tables, if one is requested: the prior is left out where
+/// the rows of all runs contradict it. For this test the range offsets and the drift from the fit
+/// without a prior are subtracted.
 Result<Adjustment> adjust_smooth(std::vector<Observations>& runs, const Options& options) {
   Result<Adjustment> a = adjust_runs(runs, options);
   if (!a || !runs.front().smoothness) {

@@ -51,7 +51,8 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
         v[kRigid + static_cast<std::size_t>(k)] =
             row.direction(k) * (row.axis_position_m(k) - centre_m_(k));
       }
-      const double time = static_cast<double>(row.segment) / last_segment_ - 0.5;  // of the run
+      // -0.5 to 0.5 over the run
+      const double time = static_cast<double>(row.segment) / last_segment_ - 0.5;
       for (std::size_t k = 0; k < kDrift; ++k) {
         v[k] *= time;
       }
@@ -184,7 +185,7 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
     add(columns_of(0, Cause::Drift, 0, kDrift));
     add(columns_of(1, Cause::Backlash, 0, kBacklash));
     add(columns_of(2, Cause::RangeOffset, 0, 1));
-    if (o_.mode == Mode::OnTheFly) {  // else a vertex is a position
+    if (o_.mode == Mode::OnTheFly) {  // in standstill mode a vertex is a position
       add(columns_of(3, Cause::Vertex, row.leg, kShift));
       add(columns_of(3, Cause::Vertex, row.leg + 1, kShift));
     }

@@ -34,8 +34,8 @@ class AlternativeColumns {
   std::size_t values(const Added&, const Observation&, Values&) const;
   /// Sums over all rows for every alternative, grouped by cause. O(rows).
   [[nodiscard]] std::vector<Family> sums(std::span<const double> residual_m) const;
-  /// Text for an alternative: "the tracker or the machine moved by 52.1 um and 3.2 urad ... on leg
-  /// 30". `d`: estimated coefficients of the columns.
+  /// Text for an alternative, such as "the tracker or the machine moved by 52.1 um and 3.2 urad ...
+  /// on leg 30". `d`: estimated coefficients of the columns.
   [[nodiscard]] std::string text(const Added&, const Eigen::VectorXd& d) const;
 
  private:

@@ -20,7 +20,8 @@ Result<Eigen::VectorXd> DriftHeldOut::correct(Eigen::VectorXd& U, const Adjustme
   const std::size_t freedom = o_.rows.size() - a.rank;
   const double factor = std::max(1.0, variance_factor(residual_noise(o_, r_m, freedom), freedom));
 
-  // The rows know the drift d as d minus the removed one, prior and visits know d.
+  // `removed_` was subtracted from the rows, so that their unknown is d minus the removed drift.
+  // Prior and visits refer to d itself: the equations are converted to d.
   DriftEquations equations{.S = reduced.S / factor};
   equations.g = reduced.g / factor + equations.S * removed_.coefficients;
   const Result<DriftEstimate> estimate = estimate_drift(*o_.drift, equations, stopped);

@@ -1,6 +1,6 @@
 #pragma once
-/// The drift of the tracker without the held-out legs of a run: legs that take part in the estimate
-/// of the drift would be predicted too well.
+/// Estimates the drift of the tracker without the held-out legs of a run. If the held-out legs took
+/// part in this estimate, they would be predicted too well.
 
 #include <functional>
 
@@ -17,12 +17,12 @@ class DriftHeldOut {
       : o_(without_drift), removed_(removed), columns_(without_drift) {}
 
   /// Estimates the drift from the rows for which `take` returns true and the visits, with the
-  /// adjustment of these rows, and corrects U for it. Result: drift of these rows minus the removed
-  /// one, as coefficients. NotConverged if `stopped` returns true.
+  /// adjustment of these rows, and corrects U for it. Returns the coefficients of the drift of
+  /// these rows minus the removed drift. NotConverged if `stopped` returns true.
   [[nodiscard]] Result<Eigen::VectorXd> correct(Eigen::VectorXd& U, const Adjustment&,
                                                 const std::function<bool(const Observation&)>& take,
                                                 const Stopped& stopped) const;
-  /// What remains of the drift in y of a row.
+  /// Effect on y of a row of the change of the drift that correct() returned.
   [[nodiscard]] double effect_m(std::size_t row, const Eigen::VectorXd& change) const {
     return columns_.effect_m(o_.rows[row], change);
   }

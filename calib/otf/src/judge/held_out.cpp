@@ -40,8 +40,8 @@ std::vector<RowInformation> information_by_fold(const Observations& o, std::size
 struct RunByFold {
   const Observations& o;
   std::vector<RowInformation> parts;
-  std::optional<Observations> with_linear;  ///< absent if the tables of `o` are linear
-  std::optional<DriftHeldOut> drift{};      ///< if a drift was removed from `o`
+  std::optional<Observations> with_linear;  ///< nullopt if the tables of `o` are linear
+  std::optional<DriftHeldOut> drift{};      ///< nullopt if no drift was removed from `o`
 
   RunByFold(const Observations& run, std::size_t folds, const Solution* solution)
       : o(run), parts(information_by_fold(run, folds)) {
@@ -58,7 +58,7 @@ struct RunByFold {
 struct HeldOutFold {
   Eigen::VectorXd U;
   Eigen::VectorXd change_of_drift{};  ///< coefficients; empty without a drift
-  /// for each run the held-out rows: U was not fitted to them
+  /// for each run the held-out rows, to which U was not fitted
   std::vector<std::vector<std::size_t>> rows;
 };
 
@@ -67,9 +67,9 @@ struct FittedFold {
   Eigen::VectorXd change_of_drift{};
 };
 
-/// `first`: the first run. Only a single run has its drift estimated again without the held-out
-/// legs; with several runs the drift that was removed is that of all legs. `training`: information
-/// of the rows for which `take` returns true.
+/// Fits all runs without a fold. `first`: the first run. The drift is estimated again without the
+/// held-out legs only if there is a single run; with several runs the removed drift is that of all
+/// legs. `training`: information of the rows for which `take` returns true.
 Result<FittedFold> fit_fold(const RunByFold& first, const estimation::Information& training,
                             std::size_t unknowns,
                             const std::function<bool(const Observation&)>& take,

@@ -28,7 +28,7 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others,
       verdict.notes.push_back(run + other.text);
     } else if (other.bias_m <= other.u_m) {
       verdict.notes.push_back(text);
-    } else {  // larger, or NaN
+    } else {  // the effect is larger than u, or NaN
       verdict.refuse(name(other.cause), text, reasons++);
     }
   }
@@ -82,8 +82,8 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
 /// the prior then determines the estimate.
 void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, double prior_m,
                               const std::string& run) {
-  const double share = offset.u_m / prior_m;  // 1: the data determine nothing
-  constexpr double kOfEqualWeight = 0.7;      // 1/sqrt(2): data and prior of equal weight
+  const double share = offset.u_m / prior_m;  // 1: the data contain no information
+  constexpr double kOfEqualWeight = 0.7;      // 1/sqrt(2): data and prior have equal weight
   if (!(prior_m > 0.0) || !(share > kOfEqualWeight)) {
     return;
   }

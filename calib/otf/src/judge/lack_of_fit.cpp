@@ -63,7 +63,7 @@ struct Fit {
   RigidFreeNorm norm;
   double u_white_m = 0.0;
 
-  /// chi2 in excess of the noise between neighbouring segments.
+  /// Excess of chi2 over its value for the noise between neighbouring segments.
   [[nodiscard]] double excess() const {
     return chi2 - static_cast<double>(degrees_of_freedom) * noise.local * noise.local;
   }
@@ -201,7 +201,8 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   const double drop = fit.chi2 - chi2(other, left);
   const double factor = residual_noise(other, left, other.rows.size() - a->rank).variance_factor();
   const auto rank = static_cast<double>(a->rank);
-  const double more = cause == Cause::OtherRuns  // every unknown of the run is one more
+  const double more = cause == Cause::OtherRuns  // a run with its own tables: all its unknowns are
+                                                 // additional
                           ? rank
                           : std::max(1.0, rank - static_cast<double>(fit.adjustment.rank));
   const double bound = std::max(fit.noise.local * fit.noise.local, factor) *
@@ -294,7 +295,7 @@ Result<std::optional<Alternative>> closer_nodes(const Fit& fit, const Solution& 
                       options);
 }
 
-/// Tables that this run does not share with others.
+/// The alternative that this run has its own tables, different from those of the other runs.
 Result<std::optional<Alternative>> own_tables(const Fit& fit, const Solution& solution,
                                               const Options& options) {
   const ParameterLayout& shared = fit.o.layout();
@@ -306,7 +307,7 @@ Result<std::optional<Alternative>> own_tables(const Fit& fit, const Solution& so
       options);
 }
 
-/// The designs that are compared if the residuals are too large.
+/// The design matrices that are tested if the residuals are too large.
 std::vector<decltype(&closer_nodes)> other_designs(Tables tables) {
   if (tables == Tables::OfSeveralRuns) {
     return {own_tables};

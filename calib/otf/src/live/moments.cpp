@@ -36,8 +36,8 @@ Vector6 moment_vector(const CellMoments& moments) {
   return G;
 }
 
-/// M = L L^T for a positive semidefinite M: fewer than three samples give a singular one. A column
-/// of L is zero where the Schur complement is rounding of M.
+/// Cholesky factor L of a positive semidefinite M = L L^T (fewer than three samples give a singular
+/// M). A column of L is set to zero if its Schur complement is only rounding of M.
 Matrix6 semidefinite_cholesky(const Matrix6& M) {
   constexpr double kRounding = 1e-13;
   Matrix6 L = Matrix6::Zero();
@@ -136,7 +136,8 @@ void MomentAccumulator::begin_leg(const Vector3& from_m, const Vector3& to_m) {
   }
 
   const Vector3 way_m = to_m - from_m;
-  // Any two directions across the leg: those of a beam along the leg.
+  // Any two directions across the leg can be used. path_frame() with a beam along the leg gives
+  // them.
   const PathFrame frame = path_frame(way_m, way_m, setup_.noise);
   leg_.from_m = from_m;
   leg_.length_m = way_m.norm();
@@ -157,7 +158,8 @@ void MomentAccumulator::add(const Vector3& p_tracker_m) {
     return;
   }
 
-  // a2 is the direction of the beam's part across the leg, (b1, b2) / |(b1, b2)| in e_1 and e_2.
+  // a2 is the direction of the component of the beam across the leg, (b1, b2) / |(b1, b2)| in e_1
+  // and e_2.
   const double b1 = leg_.e1.dot(beam_m), b2 = leg_.e2.dot(beam_m);
   const double across2 = b1 * b1 + b2 * b2, range2 = beam_m.squaredNorm();
   const double sigma_angle2 = setup_.noise.sigma_angle_rad * setup_.noise.sigma_angle_rad;
@@ -165,7 +167,7 @@ void MomentAccumulator::add(const Vector3& p_tracker_m) {
   const double cosine2 = across2 / range2;
   const double w3 = 1.0 / (sigma_angle2 * range2);
   const double w2 = 1.0 / (sigma_range2 * cosine2 + sigma_angle2 * range2 * (1.0 - cosine2));
-  // Along the beam both directions have the same weight, and a2 is arbitrary.
+  // If the beam is along the leg, both directions have the same weight, and a2 is arbitrary.
   const double per_across = across2 > 0.0 ? (w2 - w3) / across2 : 0.0;
   const std::array w{w3 + per_across * b1 * b1, per_across * b1 * b2, w3 + per_across * b2 * b2};
   const double r1 = leg_.e1.dot(from_begin_m), r2 = leg_.e2.dot(from_begin_m);
@@ -232,7 +234,7 @@ std::vector<MomentAccumulator::PolynomialColumn> MomentAccumulator::columns_in(
     at[i].resize(columns.size());
   }
 
-  // Within a cell the unknowns are the same at every x.
+  // Within a cell the non-zero columns are those of the same unknowns at every x.
   std::vector<PolynomialColumn> polynomials;
   polynomials.reserve(at[0].size());
   for (std::size_t k = 0; k < at[0].size(); ++k) {

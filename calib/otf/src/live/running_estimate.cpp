@@ -18,19 +18,20 @@ namespace {
 
 constexpr double kLargestSecondOrder_m = 0.1e-6;
 
-/// Prior of an unknown, m or rad, in the units of the unknown. The rigid unknowns have ten times
-/// this prior: the pose of three vertices can be wrong by more than the errors of the machine.
+/// Standard deviation of the prior of an unknown, m or rad. The prior of the rigid unknowns is ten
+/// times wider, because the pose from three vertices may have larger errors than the machine.
 constexpr double kPrior = 1e-3, kRigidPrior = 10.0 * kPrior;
 constexpr double kLargestU = 0.05 * kPrior;
 
-/// The conditions of the datum are met within 1 nm and 1 nrad.
+/// Weight of the datum conditions: they are satisfied within 1 nm and 1 nrad.
 constexpr double kDatumWeight = 1e9;
 
-/// Share of an unknown in a null space, squared entry of a unit vector: rounding is below 1e-16.
+/// Share of an unknown in a null space: squared entry of a unit vector. Larger shares are not
+/// rounding, which is below 1e-16.
 constexpr double kRoundingShare = 1e-8;
 
-/// Width of the pairs across their longest direction, relative to their length: less does not
-/// determine the rotation about that direction.
+/// Least width of the pairs across their longest direction, relative to their length. Narrower
+/// pairs do not determine the rotation about this direction.
 constexpr double kLeastWidth = 0.1;
 
 bool span_a_plane(std::span<const Vector3> points_m) {
@@ -60,7 +61,7 @@ struct Estimate {
   Eigen::VectorXd U, u;
 };
 
-/// Prior N(0, prior^2) of every unknown, and the solution of the triangle.
+/// Adds the prior N(0, prior^2) of every unknown and solves the triangular system.
 Estimate regular_estimate(estimation::Information all, const Eigen::VectorXd& prior) {
   for (Eigen::Index i = 0; i < prior.size(); ++i) {
     all.add_prior(static_cast<std::size_t>(i), 0.0, prior(i));
@@ -84,8 +85,9 @@ double factor_of(const estimation::Information& data, const Eigen::VectorXd& U, 
   return std::max({1.0, per_dof(chi2, dof), between});
 }
 
-/// A relative change s of all ranges, or of the scale of an axis, changes the positioning tables by
-/// s (q - reference): they meet the datum, and the rest of the change is a rigid motion.
+/// Effect of an uncertain scale on a node of a table. A relative change s of all ranges, or of the
+/// scale of an axis, changes the positioning tables by s (q - reference). This satisfies the datum;
+/// the rest of the change is a rigid motion.
 double scale_effect(const ErrorMotion& motion, const AxisNodes& nodes, std::size_t node,
                     const Noise& noise) {
   if (!is_positioning(motion)) {
@@ -110,7 +112,7 @@ Result<RunningEstimate> RunningEstimate::of(Setup setup) {
   ABBE_TRY(basis);
 
   RunningEstimate estimate(std::move(setup), *std::move(basis));
-  // The noise is checked here, not at the first pose.
+  // The noise is checked here, so that an error is not reported only at the first pose.
   auto moments = MomentAccumulator::of({.basis = estimate.basis_, .noise = estimate.setup_.noise});
   ABBE_TRY(moments);
   return estimate;
@@ -146,7 +148,7 @@ bool RunningEstimate::take_if_better(const RigidTransform& T) {
   return second_order_m(T).value_or(2.0 * kLargestSecondOrder_m) > kLargestSecondOrder_m && use(T);
 }
 
-/// nullopt: there is no pose yet.
+/// Terms of second order between T and the present pose; nullopt: there is no pose yet.
 std::optional<double> RunningEstimate::second_order_m(const RigidTransform& T) const {
   if (!moments_) {
     return std::nullopt;
@@ -191,7 +193,7 @@ bool RunningEstimate::knows_travel() const {
          std::count(travel_.begin(), travel_.end(), Travel::Unknown) == 0;
 }
 
-/// 0 without backlash.
+/// Half the difference between the directions of travel at a node; 0 without backlash.
 double RunningEstimate::half_difference(std::size_t table, std::size_t node,
                                         const Eigen::VectorXd& U) const {
   const ParameterLayout& layout = basis_.layout();
@@ -200,7 +202,7 @@ double RunningEstimate::half_difference(std::size_t table, std::size_t node,
       return 0.0;
     case TravelDependence::Backlash:
       return 0.5 * U(static_cast<Eigen::Index>(layout.model_size() + table));
-    case TravelDependence::Tables:  // in the order of the nodes
+    case TravelDependence::Tables:  // the order of D is that of the nodes
       return 0.5 * U(static_cast<Eigen::Index>(layout.model_size() + layout.tables()[table].offset +
                                                node));
   }

@@ -11,7 +11,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Covariance of the drift at two times relative to the zero, in units of the duration.
+/// Covariance of the drift at the times s and t, measured from the first visit in units of the
+/// duration of the run.
 double prior_covariance(double s, double t, DriftCourse course) {
   const double rate = s * t;
   const bool curved = course == DriftCourse::Curved;

@@ -8,8 +8,8 @@
 /// The alignment removes from the observations a rigid motion that depends on the errors of the
 /// machine; no model contains this motion. Therefore, on each held-out fold, the best-fit rigid
 /// motion (six parameters, same rows) is removed from the residuals of no compensation, candidate
-/// and active model separately, and the remaining residuals are compared. So the comparison is also
-/// independent of the datums.
+/// and active model separately, and the remaining residuals are compared. The comparison is
+/// therefore also independent of the datums.
 
 #include <cstddef>
 #include <functional>
@@ -27,17 +27,19 @@ namespace abbe::calib::otf {
 using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double no_compensation_m,
                                       double candidate_m)>;
 
-/// `active`, the model in use, may be null. The active model is compared on the rows inside its
-/// validity volume, and not at all if it is not valid for the target offset of this run. If a node
-/// of the tables has observations from one leg only, this leg is never held out, because without
-/// the leg the node is not determined; the observations of the leg are counted in `not_held_out`.
-/// RankDeficient if no fold can be held out. TooFewObservations if there are fewer legs than folds.
+/// Computes the held-out figures of one run. `active`, the model in use, may be null. It is
+/// compared on the rows inside its validity volume, and not at all if it is not valid for the
+/// target offset of this run. If a node of the tables has observations from one leg only, this leg
+/// is never held out, because without the leg the node is not determined; the observations of the
+/// leg are counted in `not_held_out`. RankDeficient if no fold can be held out. TooFewObservations
+/// if there are fewer legs than folds.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 
-/// The same for the common adjustment of several runs (targets.hpp). The folds are those of each
-/// run. `solutions`: of the runs, if the observations are those of without_run_effects(); the drift
-/// of the tracker in a single run is then estimated again without the held-out legs.
+/// Computes the held-out figures of the common adjustment of several runs (targets.hpp). The folds
+/// are those of each run. `solutions`: those of the runs, if the observations are those of
+/// without_run_effects(). If there is a single run, the drift of the tracker is then estimated
+/// again without the held-out legs.
 [[nodiscard]] Result<HeldOutFigures> held_out(std::span<const Observations>,
                                               const VolumetricModel* active, const Options& = {},
                                               const HeldOutRow& row = {},
@@ -48,8 +50,8 @@ using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double n
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&,
                                     const VolumetricModel* active, const GateLimits& = {},
                                     const Options& = {}, const HeldOutRow& row = {});
-/// The same for the common adjustment of several runs (targets.hpp): one solution per run, all with
-/// the same model. The evidence for the orientation of the path is that of the first run.
+/// Judges the common adjustment of several runs (targets.hpp): one solution per run, all with the
+/// same model. The evidence for the orientation of the path is that of the first run.
 [[nodiscard]] Result<Verdict> judge(std::span<const Observations>, std::span<const Solution>,
                                     const VolumetricModel* active, const GateLimits& = {},
                                     const Options& = {}, const HeldOutRow& row = {});

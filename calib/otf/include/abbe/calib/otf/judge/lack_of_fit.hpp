@@ -3,7 +3,7 @@
 /// alternative is one of
 /// - a few additional columns C in the adjustment y = A U + C d: the tracker moved, the machine
 ///   drifts, an axis has backlash, a vertex or a leg of the path was driven at another position,
-///   the ranges have an offset, or they have one from a beam break on,
+///   the ranges have an offset, or have an offset after a beam break,
 /// - another design matrix: another order of the axes, or closer nodes.
 ///
 /// With the residuals r of the model, the weights W of the rows (1/sigma) and Q = (A^T W^2 A)^-1,
@@ -54,11 +54,11 @@ struct Alternative {
   double u_m = 0.0;        ///< rms u of V if the alternative is true, rigid motion removed
 };
 
-/// The significant alternatives (family-wise error probability 1e-4), at most one per cause, sorted
-/// by `explained`, largest first. CorrelatedNoise is put first if the residuals are correlated and
-/// no alternative has `explained` of one half or more.
-/// With Tables::OfSeveralRuns (targets.hpp) the run is fitted with tables of its own instead of
-/// another order of axes or closer nodes: these also fit the differences between the runs.
+/// Returns the significant alternatives (family-wise error probability 1e-4), at most one per
+/// cause, sorted by `explained`, largest first. CorrelatedNoise is put first if the residuals are
+/// correlated and no alternative has `explained` of one half or more. With Tables::OfSeveralRuns
+/// (targets.hpp) the run is compared with a fit by its own tables, instead of with another order of
+/// axes or closer nodes. The two latter would also fit the differences between the runs.
 enum class Tables { OfThisRun, OfSeveralRuns };
 [[nodiscard]] Result<std::vector<Alternative>> alternatives(const Observations&, const Solution&,
                                                             const Options& = {},

@@ -11,7 +11,7 @@
 
 namespace abbe::calib::otf {
 
-/// What remains of a row that was held out, see judge.hpp.
+/// Residuals of a held-out row that remain after removal of the best-fit rigid motion (judge.hpp).
 struct HeldOutResidual {
   double no_compensation_m = 0.0;
   double candidate_m = 0.0;

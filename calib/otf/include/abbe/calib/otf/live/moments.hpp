@@ -11,8 +11,8 @@
 ///     M_lp,l'p' = sum over samples of w_ll' x^(p+p')
 ///     G_lp      = sum over samples of (w r)_l x^p
 /// M and G replace the samples of the cell. With M = L L^T the six rows L^T C with the observations
-/// L^-1 G state the same about the unknowns as all rows of the samples: the information is not
-/// approximated, and the normal equations of the unknowns are not formed.
+/// L^-1 G contain the same information about the unknowns as all rows of the samples. The
+/// information is not approximated, and the normal equations of the unknowns are not formed.
 ///
 /// The weights are those of path_frame.hpp, for every sample:
 ///     w = a2 a2^T / sigma_2^2 + a3 a3^T / sigma_3^2
@@ -36,43 +36,45 @@ struct CellMoments {
   std::size_t samples = 0;
 };
 
-/// Not thread-safe. The pose of the tracker is a constant of the accumulation; the six rigid
-/// unknowns behind the parameters of the basis (observe.hpp, kRigidUnknowns) estimate its error.
+/// Accumulates the samples of a run. Not thread-safe. The pose of the tracker is constant during
+/// the accumulation; the six rigid unknowns after the parameters of the basis (observe.hpp,
+/// kRigidUnknowns) estimate its error.
 class MomentAccumulator {
  public:
   struct Setup {
     TableBasis basis;
     Vector3 target_offset_m = Vector3::Zero();
     RigidTransform T_machine_tracker;
-    Noise noise;              ///< of one sample
+    Noise noise;              ///< noise of one sample
     double corner_m = 0.010;  ///< Options::corner_m
-    /// One more unknown behind the rigid ones: the offset common to all ranges
-    /// (Noise::u_range_offset_m). Its column is quadratic in x with an error of (half cell /
-    /// range)^3: 2e-5 of the offset for nodes 50 mm apart, 1 m from the tracker.
+    /// True: one more unknown after the rigid ones, the offset common to all ranges
+    /// (Noise::u_range_offset_m). Its column is approximated by a quadratic function of x, with an
+    /// error of (half cell / range)^3: 2e-5 of the offset for nodes 50 mm apart, 1 m from the
+    /// tracker.
     bool range_offset = false;
   };
   /// NotApplicable if the interpolation of an axis is not linear. BadInput if a sigma of the noise
   /// is not positive.
   [[nodiscard]] static Result<MomentAccumulator> of(Setup);
 
-  /// The next samples are measured on this leg. Axis positions in m; the ends must differ.
+  /// Begins a leg: the next samples are measured on it. Axis positions in m; the ends must differ.
   void begin_leg(const Vector3& from_m, const Vector3& to_m);
-  /// A sample in the tracker frame, finite. Ignored if it is within `corner_m` of an end of the
-  /// leg, or if no leg has begun.
+  /// Adds a sample in the tracker frame; it must be finite. The sample is ignored if it is within
+  /// `corner_m` of an end of the leg, or if no leg has begun.
   void add(const Vector3& p_tracker_m);
 
   /// Number of samples that were not ignored.
   [[nodiscard]] std::size_t samples() const { return samples_; }
   [[nodiscard]] std::size_t unknowns() const { return in_R_.unknowns(); }
-  /// The part of Information::rest() and rows() that no polynomial of degree 2 within a cell
-  /// changes: it shows the noise from sample to sample only.
+  /// The part of Information::rest() and rows() that no polynomial of degree 2 within a cell can
+  /// change. It contains only the noise from sample to sample.
   struct WithinCells {
     double chi2 = 0.0;
     std::size_t rows = 0;
   };
   [[nodiscard]] WithinCells within_cells() const;
-  /// Of all samples added so far; more can be added. Takes about as long as the adjustment of
-  /// segment means (otf/solve/solve.hpp).
+  /// Information of all samples added so far; more samples can be added afterwards. Takes about as
+  /// long as the adjustment of segment means (otf/solve/solve.hpp).
   [[nodiscard]] estimation::Information information() const;
 
  private:
@@ -80,31 +82,32 @@ class MomentAccumulator {
 
   struct Leg {
     Vector3 from_m = Vector3::Zero(), direction = Vector3::UnitX();
-    Vector3 e1 = Vector3::UnitY(), e2 = Vector3::UnitZ();  ///< across the leg
+    Vector3 e1 = Vector3::UnitY(), e2 = Vector3::UnitZ();  ///< unit vectors across the leg
     double length_m = 0.0;
-    std::vector<double> crossing_m;  ///< 0, where an axis passes a node, length_m; ascending
+    std::vector<double> crossing_m;  ///< 0, distances at which an axis passes a node, length_m;
+                                     ///< ascending
   };
 
-  /// Samples between two neighbouring values of Leg::crossing_m.
+  /// The samples between two neighbouring values of Leg::crossing_m.
   struct Cell {
-    std::size_t number = kNone;  ///< index in crossing_m of its begin
+    std::size_t number = kNone;  ///< index in crossing_m of the begin of the cell
     double centre_m = 0.0, half_m = 1.0;
     CellMoments moments;
   };
 
-  /// Rows of cells that are not yet part of R: rows are added to R together (RowBatch). The rows of
-  /// a cell have up to 6 x 40 entries of 16 bytes: 4 MB for kMostCells.
+  /// Rows of cells that are not yet part of R, because rows are added to R in batches (RowBatch).
+  /// The rows of a cell have up to 6 x 40 entries of 16 bytes: 4 MB for kMostCells.
   struct WaitingRows {
     static constexpr std::size_t kMostCells = 1024;
     SparseRows A;
     std::vector<double> y;
     std::size_t cells = 0;
-    double rest = 0.0;             ///< chi2 that no unknown can change
-    std::size_t removed_rows = 0;  ///< rows of the samples less rows of A
+    double rest = 0.0;             ///< part of chi2 that no unknown can change
+    std::size_t removed_rows = 0;  ///< number of rows of the samples minus number of rows of A
     void add_to(estimation::Information&) const;
   };
 
-  /// C_lp of one unknown in a cell, l p = 10, 11, 12, 20, 21, 22.
+  /// Coefficients C_lp of one unknown in a cell, in the order l p = 10, 11, 12, 20, 21, 22.
   struct PolynomialColumn {
     std::size_t unknown = 0;
     Vector6 C = Vector6::Zero();
@@ -120,12 +123,12 @@ class MomentAccumulator {
   Setup setup_;
   MachineState state_;
   Leg leg_;
-  /// The two cells used last. A machine that stands where an axis passes a node gives samples of
-  /// both.
+  /// The two cells used last. Two are kept because a machine that stands where an axis passes a
+  /// node gives samples in both cells.
   std::array<Cell, 2> cells_;
   std::size_t current_ = 0, samples_ = 0;
   WaitingRows waiting_;
-  WithinCells within_R_;  ///< of the cells that are part of in_R_
+  WithinCells within_R_;  ///< for the cells that are part of in_R_
   estimation::Information in_R_;
 };
 

@@ -17,7 +17,7 @@ struct Alignment {
   RigidTransform T_machine_tracker;        ///< tracker frame to machine coordinates
   RigidTransform rough_T_machine_tracker;  ///< from start, end and centroid of the path only
   std::vector<std::size_t> leg;            ///< leg of every segment
-  std::vector<bool> used;                  ///< usable and outside the corners
+  std::vector<bool> used;                  ///< segment is usable and outside the corners
   int iterations = 0;
   double first_rms_m = 0.0;  ///< rms distance of the used segments to the path, first iteration
   double last_rms_m = 0.0;   ///< rms distance of the used segments to the path, last iteration
@@ -36,9 +36,10 @@ struct Alignment {
 [[nodiscard]] Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m,
                                                            const Path&, double direction_m);
 
-/// Errors: those of check(Path); AlignmentFailed if the points do not fit this path (length, rms);
-/// NotConverged after max_alignment_updates. The texts of the last two name a modified path that
-/// fits, if there is one: driven backwards, reflected, in another unit of length.
+/// Computes the alignment. Errors: those of check(Path); AlignmentFailed if the points do not fit
+/// this path (length, rms); NotConverged after max_alignment_updates. The texts of the last two
+/// name a modified path that fits, if there is one: driven backwards, reflected, in another unit of
+/// length.
 [[nodiscard]] Result<Alignment> align(const SegmentSeries&, const Machine&, const Path&,
                                       const Options&);
 

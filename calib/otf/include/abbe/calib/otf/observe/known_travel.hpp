@@ -1,6 +1,6 @@
 #pragma once
-/// The legs of a run on which the direction of travel of every axis is known. Only these are used
-/// if backlash is estimated (backlash.hpp). Pure.
+/// Finds the legs of a run on which the direction of travel of every axis is known. If backlash is
+/// estimated, only these legs are used (backlash.hpp). Pure.
 
 #include <cstddef>
 #include <span>
@@ -14,11 +14,11 @@ namespace abbe::calib::otf {
 /// The first leg (standstill: position) on which the direction of travel of all axes is known.
 /// RankDeficient if an axis does not move on the path.
 [[nodiscard]] Result<std::size_t> first_with_known_travel(std::span<const AxisTravel>);
-/// With backlash the legs before it are not used. "the legs before 2 are not used: Z had not moved
-/// yet, ..."; empty if all are used.
+/// Note on the legs that are not used because of backlash, such as "the legs before 2 are not used:
+/// Z had not moved yet, ..."; empty if all legs are used.
 [[nodiscard]] std::string note_on_unused(const Observations&);
-/// The first leg that is used; adds note_on_unused() to the notes. 0 without backlash. The error of
-/// first_with_known_travel().
+/// Index of the first leg that is used (0 without backlash); adds note_on_unused() to the notes.
+/// The error of first_with_known_travel().
 [[nodiscard]] Result<std::size_t> first_with_backlash(Observations&);
 
 }  // namespace abbe::calib::otf

@@ -2,9 +2,9 @@
 /// Stage one: computes weighted linear observations of the machine's errors from tracker points and
 /// path. Each used segment gives two rows, along a2 and a3 of its path frame. The component along
 /// the direction of travel is not used: without synchronised clocks it carries no information
-/// (weight 0 in [Sanders 2023] eq. (4)). With scale readings along_rows.hpp adds it. In standstill
-/// mode each position gives three rows, see observe_standstills.hpp; leg and segment of a row are
-/// then its position and its standstill.
+/// (weight 0 in [Sanders 2023] eq. (4)). If scale readings were recorded, along_rows.hpp adds this
+/// component. In standstill mode each position gives three rows, see observe_standstills.hpp; leg
+/// and segment of a row are then its position and its standstill.
 
 #include <Eigen/Core>
 #include <array>
@@ -48,7 +48,7 @@ struct Observation {
   Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal axis position
   std::size_t first_sub_point = 0;            ///< index in Observations::sub_points_m
   std::size_t sub_points = 0;
-  std::size_t component = 0;  ///< 0: a2, 1: a3, kAlong: along the travel; x, y, z of a standstill
+  std::size_t component = 0;  ///< 0: a2, 1: a3, kAlong: along the travel; standstill mode: x, y, z
 };
 inline constexpr std::size_t kAlong = 2;
 
@@ -62,14 +62,15 @@ struct Observations {
   Mode mode = Mode::OnTheFly;
   TableBasis basis;
   Vector3 target_offset_m = Vector3::Zero();
-  SparseRows A{};  ///< unknowns() columns
+  SparseRows A{};  ///< design matrix with unknowns() columns
   std::vector<Observation> rows{};
   /// Points within the segments, as nominal axis positions: a row of A is the mean of the model
   /// over the sub-points of its segment.
   std::vector<Vector3> sub_points_m{};
   Alignment alignment{};
   std::vector<Vector3> vertices_m{};     ///< vertices of the path, axis positions
-  std::vector<AxisTravel> travel{};      ///< by Observation::leg; a leg that is missing: unknown
+  std::vector<AxisTravel> travel{};      ///< by Observation::leg; a missing leg has unknown
+                                         ///< directions
   double u_scale = 0.0;                  ///< see Noise
   std::array<double, 3> u_axis_scale{};  ///< see Noise
   double u_range_offset_m = 0.0;         ///< see Noise
@@ -83,10 +84,10 @@ struct Observations {
   std::size_t clock_unknowns = 0;  ///< kClockUnknowns with scale readings and unknown clocks
   std::vector<std::size_t> beam_returned{};  ///< see SegmentSeries
   SetAside set_aside{};
-  std::optional<DriftObservations> drift{};  ///< if nests were visited repeatedly
-  /// The prior with which every adjustment of these rows is made.
+  std::optional<DriftObservations> drift{};  ///< data of nests, if they were visited repeatedly
+  /// Prior for smooth tables; every adjustment of these rows uses it.
   std::optional<Smoothness> smoothness{};
-  std::vector<std::string> notes{};  ///< for the verdict
+  std::vector<std::string> notes{};  ///< notes for the verdict
 
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
   /// Index in U of the first of the six rigid unknowns T, r, which follow the parameters of the
@@ -95,9 +96,9 @@ struct Observations {
   /// Index of the clock unknowns, which follow the rigid unknowns.
   [[nodiscard]] std::size_t clock_offset() const { return basis.size() + kRigidUnknowns; }
   [[nodiscard]] std::size_t unknowns() const { return clock_offset() + clock_unknowns; }
-  /// State of the machine at an axis position on a leg.
+  /// State of the machine at an axis position on a leg, with the leg's direction of travel.
   [[nodiscard]] MachineState state_on(std::size_t leg, const Vector3& q_m) const;
-  /// Name of an unknown for messages: "EXX at -0.300 m", "EC0Y", "rx".
+  /// Name of an unknown for messages, such as "EXX at -0.300 m", "EC0Y", "rx".
   [[nodiscard]] std::string label(std::size_t unknown) const;
 };
 
@@ -106,11 +107,11 @@ struct PointOnPath {
   std::size_t leg = 0;
   std::size_t segment = 0;
   Vector3 deviation_m = Vector3::Zero();      ///< measured minus closest nominal point
-  Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal
+  Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal axis position
   PathFrame frame;
   double samples = 1.0;  ///< number of samples in the mean
 };
-/// One row of a point: component along `direction`, standard uncertainty of the mean.
+/// One row of a point: the component along `direction`, and the standard uncertainty of the mean.
 struct MeasuredComponent {
   Vector3 direction = Vector3::UnitX();
   double sigma_m = 1.0;
@@ -124,24 +125,25 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 /// positions over which the design matrix is averaged.
 void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m);
 
-/// BadInput for a noise that is not positive, or a negative uncertainty.
+/// Checks the noise. BadInput for a noise that is not positive, or a negative uncertainty.
 [[nodiscard]] Result<void> check(const Noise&);
-/// Without rows: tables of the machine and uncertainties of the noise, for a run on the fly.
+/// Observations without rows, for on-the-fly mode: tables of the machine and uncertainties of the
+/// noise.
 [[nodiscard]] Result<Observations> observations_without_rows(
     const Machine&, const Path&, const Noise&, Alignment,
     TravelDependence backlash = TravelDependence::None);
 
 /// Derivative of the row's y_m with respect to an offset common to all ranges of the tracker.
 [[nodiscard]] double drow_drange_offset(const Observations&, const Observation& row);
-/// The observations that result if `range_offset_m` is subtracted from all ranges.
+/// Returns the observations after subtraction of `range_offset_m` from all ranges.
 [[nodiscard]] Observations without_range_offset(Observations, double range_offset_m);
 
-/// The observations with the design matrix of another basis, which has another order of the axes or
-/// other nodes.
+/// Returns the observations with the design matrix of another basis, which has another order of the
+/// axes or other nodes.
 [[nodiscard]] Observations with_basis(const Observations&, TableBasis);
 
-/// Observations of a run on the fly from segments that are already averaged. No sample of them is
-/// excluded.
+/// Computes the observations in on-the-fly mode from segments that are already averaged. No sample
+/// is excluded.
 [[nodiscard]] Result<Observations> observe_segments(const SegmentSeries&, const Machine&,
                                                     const Path&, const Noise&, const Options& = {});
 

@@ -1,11 +1,11 @@
 #pragma once
 /// Check of the orientation of the path. If the signs of two axes are reversed in the path file,
 /// the path is the correct one rotated by 180 degrees about the third axis. If two columns are
-/// exchanged and one sign is reversed, it is rotated by 90 degrees. The alignment compensates this
-/// rotation with a rotation of the tracker. The residuals then are the same as with the correct
-/// path, but the identified errors belong to the wrong positions. Only further evidence shows this
-/// mistake: scale readings along the path, a levelled tracker, or the known position of the
-/// tracker.
+/// exchanged and one sign is reversed, the path is rotated by 90 degrees. The alignment compensates
+/// this rotation with a rotation of the tracker. The residuals then are the same as with the
+/// correct path, but the identified errors belong to the wrong positions. This mistake can only be
+/// found with further evidence: scale readings along the path, a levelled tracker, or the known
+/// position of the tracker.
 
 #include <optional>
 #include <string_view>

@@ -13,8 +13,8 @@
 namespace abbe::calib::otf {
 
 struct EncoderReading {
-  /// Machine's clock, strictly ascending, of any origin: the computation uses differences. Times
-  /// since 1970 are multiples of 0.24 us.
+  /// Time of the machine's clock, strictly ascending. The origin is arbitrary, because only
+  /// differences are used. Times since 1970 are rounded to multiples of 0.24 us.
   double time_s = 0.0;
   Vector3 q_m = Vector3::Zero();  ///< scale readings of X, Y, Z: axis position
 };
@@ -35,12 +35,13 @@ struct EncoderLog {
   /// offset and drift of the clocks. 20 us is usual for readings that a fieldbus cycle stamps; a
   /// trigger line that latches both needs about 10 us or less.
   double sigma_time_s = 20e-6;
-  /// Clocks that are known: a trigger line, or one clock for both. Absent: they are estimated.
+  /// Relation of the clocks if it is known: a trigger line, or one clock for both. Absent: it is
+  /// estimated.
   std::optional<ClockMap> known_clock{};
 };
 
-/// BadInput: fewer than 2 readings, times do not ascend, sigma_time_s not positive. NotFinite: a
-/// time or a reading. The text gives the index of the reading.
+/// Checks the log. BadInput: fewer than 2 readings, times do not ascend, sigma_time_s not positive.
+/// NotFinite: a time or a reading. The text gives the index of the reading.
 [[nodiscard]] Result<void> check(const EncoderLog&);
 
 }  // namespace abbe::calib::otf

@@ -1,7 +1,7 @@
 #pragma once
 /// Reference nests: fixed targets beside the machine that the tracker measures between the legs of
-/// a run, while the machine stands. What all of them seem to move is drift of the tracker
-/// (tracker_drift.hpp).
+/// a run, while the machine stands still. An apparent motion that is common to all nests is drift
+/// of the tracker (tracker_drift.hpp).
 
 #include <string>
 #include <vector>
@@ -13,16 +13,15 @@ namespace abbe::calib::otf {
 struct Nest {
   std::string name;
   Vector3 position_tracker_m = Vector3::Zero();  ///< approximate, tracker frame
-  /// A target that stands closer to this position is in the nest, unless it is that of the machine
-  /// (nest_visits.hpp).
+  /// A target that stands still closer than this to the nest's position is in the nest, unless it
+  /// is the machine's target (nest_visits.hpp).
   double radius_m = 10e-3;
 };
 
 struct NestOptions {
-  std::vector<Nest> nests{};  ///< empty: nests are not looked for
+  std::vector<Nest> nests{};  ///< empty: no nests are searched
   /// Standard uncertainty of one visit of a nest, per coordinate: seating of the target, and motion
-  /// of the nest that the other nests do not have. Public tracker data show 3 um to 4.6 um from
-  /// nest to nest.
+  /// of this nest alone. Public tracker data show 3 um to 4.6 um from nest to nest.
   double u_repeatability_m = 3e-6;
 };
 

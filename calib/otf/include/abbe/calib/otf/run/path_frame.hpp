@@ -1,7 +1,7 @@
 #pragma once
-/// The path coordinate system of one point and the standard uncertainties along its axes.
-/// [Sanders 2023] eq. (1) and (4), b: unit vector of the beam, a1, a2, a3: axes of the system, with
-/// corrections:
+/// The path coordinate system of one point and the standard uncertainties along its axes, from
+/// [Sanders 2023] eq. (1) and (4). b: unit vector of the beam, a1, a2, a3: axes of the system.
+/// Corrections to the paper:
 /// - eq. (1) subtracts the scalar b.a1 from a vector; here (b.a1) a1 is subtracted,
 /// - eq. (4) contains the path direction d, for which a2.d = a3.d = 0; here the beam b is used,
 /// - U_radial in eq. (4) is a length: sigma_angle * range.

@@ -13,7 +13,7 @@ namespace abbe::calib::otf {
 
 class PathIndex {
  public:
-  /// O(n) time and memory. The path may be empty.
+  /// Builds the index in O(n) time and memory. The path may be empty.
   explicit PathIndex(Path path);
 
   [[nodiscard]] const Path& path() const noexcept { return path_; }

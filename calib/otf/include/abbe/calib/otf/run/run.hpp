@@ -47,16 +47,16 @@ struct Path {
 /// One sample of the tracker. A lost sample is either an entry with valid = false or a gap in
 /// time_s.
 struct TrackerObservation {
-  /// Tracker clock, strictly ascending, of any origin: only differences are used. Times since 1970
-  /// are multiples of 0.24 us.
+  /// Time of the tracker clock, strictly ascending. The origin is arbitrary, because only
+  /// differences are used. Times since 1970 are rounded to multiples of 0.24 us.
   double time_s = 0.0;
   Vector3 p_tracker_m = Vector3::Zero();  ///< reflector centre, tracker frame; ignored if !valid
   bool valid = true;
 };
 
 struct Noise {
-  double sigma_range_m = 2e-6;    ///< along the beam, one sample
-  double sigma_angle_rad = 3e-6;  ///< across the beam, both directions, one sample
+  double sigma_range_m = 2e-6;    ///< of one sample, along the beam
+  double sigma_angle_rad = 3e-6;  ///< of one sample, across the beam, in both directions
   /// Relative standard uncertainty common to all ranges of the run (refractive index of the air).
   /// Residuals do not show such an error: its effect is a scale error of the whole machine.
   double u_scale = 0.0;
@@ -69,7 +69,7 @@ struct Noise {
   double u_range_offset_m = 0.0;
 };
 
-/// Evidence of the orientation of the path in the machine; see orientation.hpp.
+/// Evidence for the orientation of the path in the machine; see orientation.hpp.
 struct OrientationEvidence {
   bool scales_agree = false;  ///< scale readings exist along the path and agree with it
   /// Direction of the z axis of a levelled tracker: unit vector in machine coordinates.
@@ -78,22 +78,22 @@ struct OrientationEvidence {
   bool accepted = false;               ///< the configuration accepts a path without evidence
 };
 
-/// OnTheFly: points during the motion, components across the direction of travel only.
-/// Standstill: the machine stops at every vertex of the path; all three components of the mean
-/// position of each standstill.
+/// OnTheFly: the tracker measures during the motion; only components across the direction of travel
+/// are used. Standstill: the machine stops at every vertex of the path; all three components of the
+/// mean position of each standstill are used.
 enum class Mode { OnTheFly, Standstill };
-/// "on-the-fly", "standstill"
+/// Returns "on-the-fly" or "standstill".
 [[nodiscard]] std::string_view name(Mode);
-/// nullopt for any other name.
+/// The mode with this name; nullopt for any other text.
 [[nodiscard]] std::optional<Mode> mode_named(std::string_view);
 
-/// TwoStep: the alignment first, then one linear adjustment ([Sanders 2023]). The rotation that the
-/// alignment takes from the errors of the machine remains in the second order: 0.025 um for errors
-/// of 0.1 mm.
+/// TwoStep: the alignment first, then one linear adjustment ([Sanders 2023]). The alignment absorbs
+/// a rotation from the errors of the machine; its effect of second order remains: 0.025 um for
+/// errors of 0.1 mm.
 /// Simultaneous: alignment and errors together, by Gauss-Newton from the result of TwoStep
 /// (simultaneous.hpp); correlated noise is prewhitened (prewhitening.hpp).
 enum class Estimator { TwoStep, Simultaneous };
-/// In files and messages: "two-step", "simultaneous".
+/// Name in files and messages: "two-step" or "simultaneous".
 [[nodiscard]] std::string_view name(Estimator);
 [[nodiscard]] std::optional<Estimator> estimator(std::string_view name);
 
@@ -107,8 +107,8 @@ using Stopped = std::function<bool()>;
 
 struct Options {
   Mode mode = Mode::OnTheFly;
-  StandstillOptions standstill;  ///< of Mode::Standstill
-  /// Of Mode::OnTheFly; standstills are always adjusted by TwoStep.
+  StandstillOptions standstill;  ///< options of Mode::Standstill
+  /// Estimator of Mode::OnTheFly; standstills are always adjusted by TwoStep.
   Estimator estimator = Estimator::Simultaneous;
   /// None: the tables are the mean of both directions of travel, and backlash stays in the
   /// residuals. Backlash, Tables: the differences between both directions are estimated, too, one
@@ -148,9 +148,10 @@ struct Options {
   /// AlignmentFailed if measured and nominal length of the path differ by more than this fraction.
   /// A measured length that is too short may be explained by beam breaks.
   double max_length_mismatch = 0.05;
-  /// Simultaneous: it stops when an adjustment changes the estimate by less than this fraction of
-  /// its standard uncertainty (root mean square over all combinations of the unknowns). Three
-  /// adjustments are usual; the second already changes it by a fifth of the uncertainty only.
+  /// The iteration of Estimator::Simultaneous stops when an adjustment changes the estimate by less
+  /// than this fraction of its standard uncertainty (root mean square over all combinations of the
+  /// unknowns). Three adjustments are usual; the second already changes it by a fifth of the
+  /// uncertainty only.
   double adjustment_tolerance = 1e-3;
   int max_adjustments = 10;
   /// Weight of the datum conditions in the adjustment (DatumOptions::weight). Any positive value
@@ -159,9 +160,9 @@ struct Options {
   /// Number of folds of the cross-validation; the observations are assigned to folds by leg.
   std::size_t held_out_folds = 5;
   OrientationEvidence orientation;
-  /// Scale readings beside the tracker's points, for Mode::OnTheFly: identify() then also uses the
-  /// component along the direction of travel (along_rows.hpp). Null: it is not used. Must outlive
-  /// the computation.
+  /// Scale readings in addition to the tracker's points, for Mode::OnTheFly: identify() then also
+  /// uses the component along the direction of travel (along_rows.hpp). Null: this component is not
+  /// used. Must outlive the computation.
   const EncoderLog* encoders = nullptr;
   /// Reference nests that the tracker visits between the legs: the drift of the
   /// tracker is then estimated (tracker_drift.hpp).

@@ -1,16 +1,16 @@
 #pragma once
-/// Option of a prior for the smoothness of the error tables (smoothness.hpp).
+/// Size of the prior for the smoothness of the error tables (smoothness.hpp).
 
 #include <array>
 
 namespace abbe::calib::otf {
 
 struct SmoothnessOptions {
-  /// Of the tables of X, Y, Z: standard deviation of the bend of a table over three nodes 50 mm
+  /// For the tables of X, Y, Z: standard deviation of the bend of a table over three nodes 50 mm
   /// apart, see smoothness.hpp. 0: no prior for the tables of this axis.
   std::array<double, 3> bend_m{};
 };
-/// The size of a prior that can be stated: 0.01 um to 1 mm.
+/// True if this is a permitted size of the prior: 0.01 um to 1 mm.
 [[nodiscard]] inline bool is_bend_size(double bend_m) {
   constexpr double kLeast_m = 0.01e-6 * (1.0 - 1e-9), kMost_m = 1e-3 * (1.0 + 1e-9);
   return bend_m >= kLeast_m && bend_m <= kMost_m;

@@ -1,11 +1,13 @@
 #pragma once
-/// Visits of reference nests in the stream of the tracker. Valid samples that follow one another
-/// within the radius of a nest, with pauses of at most 2 s, are a visit if the target stands in at
-/// least half of them for at least 0.5 s: within 50 um, or six standard deviations of a sample, of
-/// their median. Other samples within the radius belong to a target that passes. So do those that
-/// follow on the sample before them, or are followed by the one behind them, without a gap of more
-/// than four sample periods, and all samples within 1 mm of such a place: the target of the machine
-/// that stands at a vertex near the nest.
+/// Finds visits of reference nests in the stream of the tracker. A visit consists of consecutive
+/// valid samples within the radius of a nest, with pauses of at most 2 s. In at least half of them,
+/// and for at least 0.5 s, the target must stand still: within 50 um, or six standard deviations of
+/// a sample, of their median.
+///
+/// Other samples within the radius are not a visit: they belong to a target that moves past.
+/// Samples that follow the sample before them, or are followed by the next sample, without a gap of
+/// more than four sample periods also belong to the machine's target, which stands at a vertex near
+/// the nest. All samples within 1 mm of such a place are excluded, too.
 
 #include <cstddef>
 #include <optional>
@@ -25,24 +27,24 @@ struct NestVisit {
   /// Covariance of the mean from the noise of the samples: stated for the tracker, or larger if
   /// their scatter or the scatter of means over eighths of the visit is larger.
   Matrix3 cov_tracker_m2 = Matrix3::Zero();
-  std::size_t samples = 0;  ///< in the mean
+  std::size_t samples = 0;  ///< number of samples in the mean
 };
 
 struct NestVisits {
   std::vector<NestVisit> found;        ///< in the order of time
-  std::vector<std::string> names{};    ///< of the nests
+  std::vector<std::string> names{};    ///< names of the nests
   std::vector<std::size_t> samples{};  ///< indices of all samples that belong to visits
-  std::vector<std::string> notes{};    ///< for the verdict: nests never or too shortly seen, or
-                                       ///< near which the machine stood
+  std::vector<std::string> notes{};    ///< notes for the verdict: nests that were never or too
+                                       ///< shortly seen, or near which the machine stood
 };
 
-/// Index of the nest within whose radius a point is.
+/// Index of the nest whose radius contains the point; nullopt: none.
 [[nodiscard]] std::optional<std::size_t> nest_at(const Vector3& p_tracker_m,
                                                  const std::vector<Nest>&);
 
-/// No visits without nests. BadInput for a nest without a name, two of the same name, a radius or
-/// repeatability that is not positive, or two nests whose radii overlap. Times and positions of the
-/// samples must be numbers.
+/// Finds the visits; without nests there are none. BadInput for a nest without a name, two nests
+/// with the same name, a radius or repeatability that is not positive, or two nests whose radii
+/// overlap. Times and positions of the samples must be finite.
 [[nodiscard]] Result<NestVisits> find_nest_visits(std::span<const TrackerObservation>,
                                                   const NestOptions&, const Noise&);
 

@@ -10,11 +10,11 @@
 /// Legs, or positions of standstills, before the first motion of an axis are not used: s of this
 /// axis is not known there.
 ///
-/// Not estimable: differences between directions that the path does not show, for example of an
-/// axis that moves in one direction only. The prior N(0, kUOfBacklash^2) of each b or D leaves
-/// these at zero. With one value per table it does not change the model: b and a constant of the
-/// table then occur only as their sum, and the datum fixes the constants of all tables. With one
-/// value per node U is uncertain by half the prior where the path shows one direction only.
+/// Not estimable: differences between directions of an axis that moves in one direction only. The
+/// prior N(0, kUOfBacklash^2) of each b or D leaves these at zero. With one value per table the
+/// prior then does not change the model: b and a constant of the table occur only as a sum, and the
+/// datum fixes the constants of all tables. With one value per node, U has the additional
+/// uncertainty of half the prior at nodes that were passed in one direction only.
 
 #include <Eigen/Core>
 #include <span>
@@ -29,14 +29,16 @@
 
 namespace abbe::calib::otf {
 
-/// `data` with the prior of all differences; unchanged without backlash.
+/// Returns `data` with the prior of all differences added; unchanged without backlash.
 [[nodiscard]] estimation::Information with_backlash_prior(estimation::Information data,
                                                           const Observations&);
-/// In the order of the unknowns; empty without backlash. `U`, `covariance`: of all unknowns.
+/// The differences in the order of the unknowns; empty without backlash. `U`, `covariance`: for all
+/// unknowns.
 [[nodiscard]] std::vector<Backlash> backlash_of(const Observations&, const Eigen::VectorXd& U,
                                                 const Eigen::MatrixXd& covariance);
-/// The model of an adjustment with the unknowns U: datum G2, mean of both directions, with the
-/// differences if they were estimated. `covariance`: of U. `tool_offsets_m`: of all runs.
+/// Makes the model from the unknowns U of an adjustment: datum G2, mean of both directions, with
+/// the differences if they were estimated. `covariance`: that of U. `tool_offsets_m`: those of all
+/// runs.
 [[nodiscard]] Result<VolumetricModel> model_of(const Observations&,
                                                std::span<const Vector3> tool_offsets_m,
                                                const Eigen::VectorXd& U,

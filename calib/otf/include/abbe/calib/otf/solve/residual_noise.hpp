@@ -1,5 +1,6 @@
 #pragma once
-/// Noise of the residuals of a run, for its uncertainty and for the tests of lack_of_fit.hpp. Pure.
+/// Computes the noise of the residuals of a run, for its uncertainty and for the tests of
+/// lack_of_fit.hpp. Pure.
 
 #include <cstddef>
 #include <optional>
@@ -23,8 +24,8 @@ struct ResidualNoise {
   /// Factor for the covariance computed with the stated, white noise; at least 1.
   [[nodiscard]] double variance_factor() const;
 };
-/// `residual_m`: one residual per row. `degrees_of_freedom`: rows - rank. `of`: only the rows of
-/// this component.
+/// Computes the noise. `residual_m`: one residual per row. `degrees_of_freedom`: rows - rank. `of`:
+/// if given, only the rows of this component are used.
 [[nodiscard]] ResidualNoise residual_noise(const Observations&, std::span<const double> residual_m,
                                            std::size_t degrees_of_freedom,
                                            std::optional<std::size_t> of = {});

@@ -5,8 +5,8 @@
 /// in square-root form (estimation/information.hpp; the pseudo-inverse of [Sanders 2023] eq. (7)
 /// gives the same fit in another datum). A: design matrix, U: parameters, y: observations, W:
 /// diagonal, W^2: weights, K U = 0: datum conditions (model_datum.hpp). These conditions can be
-/// satisfied without changing the residuals; so they hold exactly, and the solution does not depend
-/// on mu (estimation/datum.hpp).
+/// satisfied without changing the residuals. Therefore they hold exactly, and the solution does not
+/// depend on mu (estimation/datum.hpp).
 ///
 /// Covariance, with H = A^T W^2 A and Q = (H + mu K^T K)^-1:
 ///     Cov = Q H Q                      if the weights are 1/sigma^2
@@ -28,8 +28,8 @@
 /// if the residuals show them. The drift of the tracker (tracker_drift.hpp) enters as further
 /// columns C, with the information of the visits of nests and the prior in place of 1/u^2.
 ///
-/// VolumetricModel lists what is not estimable. Rank and condition refer to the column-scaled data,
-/// without the datum.
+/// The header of VolumetricModel states what is not estimable. Rank and condition refer to the
+/// column-scaled data, without the datum.
 
 #include <Eigen/Core>
 #include <array>
@@ -48,14 +48,15 @@
 
 namespace abbe::calib::otf {
 
-/// In files: "direct", one linear adjustment without iteration, or "converged".
+/// Text for files: "direct" (one linear adjustment without iteration) or "converged".
 [[nodiscard]] std::string_view stop_reason(Estimator);
 
 /// Information of a set of rows about the unknowns of Observations.
 struct RowInformation {
-  estimation::Information data;  ///< weighted with `weight`
-  /// the rows weighted with weight^2 sigma^2: covariance of A^T W^2 y from the noise of the rows;
-  /// absent if all weights are 1/sigma^2, because it then equals `data`
+  estimation::Information data;  ///< rows with the weights `weight`
+  /// information of the rows with the weights weight^2 sigma^2, whose matrix is the covariance of
+  /// A^T W^2 y caused by the noise of the rows; absent if all weights are 1/sigma^2, because it
+  /// then equals `data`
   std::optional<estimation::Information> noise;
 
   explicit RowInformation(std::size_t unknowns) : data(unknowns) {}
@@ -67,10 +68,10 @@ struct RowInformation {
     const Observations&, const std::function<bool(const Observation&)>& take = {});
 
 /// Parameters U in datum G2, with their covariance caused by the noise of the rows. With
-/// Observations::smoothness `rank` is that of Statistics.
+/// Observations::smoothness, `rank` is defined as Statistics::rank.
 using Adjustment = estimation::DatumSolution;
-/// RankDeficient if the rank defect of the data is larger than the number of datum conditions. The
-/// text names parameters that are not determined.
+/// Adjusts the rows. RankDeficient if the rank defect of the data is larger than the number of
+/// datum conditions. The text names parameters that are not determined.
 [[nodiscard]] Result<Adjustment> adjust(const RowInformation&, const Observations&,
                                         double datum_weight = 1.0);
 
@@ -78,21 +79,21 @@ struct ResidualStatistics {
   double mean_abs_m = 0.0;
   double rms_m = 0.0;
   double max_abs_m = 0.0;
-  double weighted_rms = 0.0;  ///< of residual / sigma
+  double weighted_rms = 0.0;  ///< root mean square of residual / sigma
 };
 
 /// One residual per row, in row order.
 struct Residuals {
-  std::vector<double> before_m;  ///< y of the row: after the alignment, without a model
+  std::vector<double> before_m;  ///< y of each row: after the alignment, without a model
   std::vector<double> after_m;
 };
 
 struct Statistics {
   std::size_t samples = 0, lost_samples = 0, segments = 0, segments_used = 0;
-  std::size_t observations = 0;  ///< rows
-  std::size_t unknowns = 0;      ///< columns
-  /// With a prior for smooth tables: the number of combinations of the unknowns that the data
-  /// determine, trace(Q A^T W^2 A), rounded.
+  std::size_t observations = 0;  ///< number of rows
+  std::size_t unknowns = 0;      ///< number of columns
+  /// Rank of the data. With a prior for smooth tables: the number of combinations of the unknowns
+  /// that the data determine, trace(Q A^T W^2 A), rounded.
   std::size_t rank = 0;
   std::size_t datum_conditions = 0;
   std::size_t degrees_of_freedom = 0;  ///< observations - rank
@@ -103,14 +104,14 @@ struct Statistics {
   double correlation = 1.0;  ///< see ResidualNoise::correlation
   /// Factor applied to the covariance [Birge 1932]: chi2_per_dof times `correlation` if this
   /// product exceeds the 99.9 % quantile of chi2/dof for the stated uncertainties, else 1. After
-  /// prewhitening both are of the prewhitened residuals.
+  /// prewhitening both values are those of the prewhitened residuals.
   double variance_factor = 1.0;
   /// Autocorrelation of the noise from segment to segment along a2 and a3 that prewhitening
-  /// removed; 0 without it.
+  /// removed; 0 without prewhitening.
   std::array<double, 2> noise_correlation{};
-  ResidualStatistics before;  ///< of Residuals::before_m
-  ResidualStatistics after;   ///< of Residuals::after_m
-  int iterations = 0;         ///< adjustments
+  ResidualStatistics before;  ///< statistics of Residuals::before_m
+  ResidualStatistics after;   ///< statistics of Residuals::after_m
+  int iterations = 0;         ///< number of adjustments
   int alignment_iterations = 0;
   double alignment_rms_m = 0.0;
 };
@@ -121,25 +122,27 @@ struct RangeOffset {
   double u_m = 0.0;
 };
 
-/// What the scale readings contributed (along_rows.hpp).
+/// Clock and statistics of the rows from scale readings (along_rows.hpp).
 struct Synchronisation {
   ClockMap clock;
   double u_offset_s = 0.0;  ///< 0: the clocks are known
   double u_drift = 0.0;
-  std::size_t rows = 0;  ///< along the direction of travel
-  /// Along these rows, with their stated uncertainties.
+  std::size_t rows = 0;  ///< number of rows along the direction of travel
+  /// chi2 per degree of freedom of these rows, with their stated uncertainties.
   double chi2_per_dof = 0.0;
   /// Factor of the stated standard uncertainties with which the rows were used; at least 1.
   double sigma_factor = 1.0;
 };
 
-/// The fit of which the model was made, for with_misfit().
+/// The fit from which the model was made; input of with_misfit().
 struct FitOfRows {
-  Eigen::VectorXd U;  ///< of all unknowns of Observations
-  /// Of the rows, without range offset, drift and errors of two axes.
+  Eigen::VectorXd U;  ///< all unknowns of Observations
+  /// Residuals of the rows after subtraction of range offset, drift and errors of two axes.
   std::vector<double> residual_m;
-  Eigen::MatrixXd covariance_of_noise;  ///< of U, as far as the noise of the rows causes it
-  /// Over which the noise is correlated, s; for segments without times in units of a segment.
+  Eigen::MatrixXd covariance_of_noise;  ///< part of the covariance of U that is caused by the noise
+                                        ///< of the rows
+  /// Time in s over which the noise is correlated; for segments without times in units of a
+  /// segment.
   double correlation_time = 0.0;
   std::optional<TwoAxisErrors> two_axes{};
 };
@@ -149,8 +152,9 @@ struct Solution {
   VolumetricModel model;            ///< datum G2, no rigid unknowns, mean of both directions
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::VectorXd clock{};  ///< corrections of the clock unknowns, if the observations have them
-  Eigen::MatrixXd covariance_with_rigid;  ///< of all unknowns of Observations
-  Adjustment adjustment;                  ///< of the rows alone: white noise, no range offset
+  Eigen::MatrixXd covariance_with_rigid;  ///< covariance of all unknowns of Observations
+  Adjustment adjustment;                  ///< adjustment of the rows alone: white noise, no range
+                                          ///< offset
   RigidTransform T_machine_tracker;
   Statistics statistics;
   /// after_m: model, range offset, drift and errors of two axes subtracted
@@ -161,22 +165,23 @@ struct Solution {
   std::vector<Backlash> backlash{};                  ///< with Options::backlash
   std::optional<TrackerDrift> drift{};               ///< with Options::nests
   std::optional<Smoothness> smoothness{};            ///< with Options::smoothness
-  /// With Noise::u_range_offset_m, for runs that share the offset; not with nests, where it is
-  /// estimated beside the drift.
+  /// The range offset, for combining this run with others that have the same offset. Only with
+  /// Noise::u_range_offset_m and without nests (with nests it is estimated together with the
+  /// drift).
   std::optional<OffsetInModel> offset_in_model{};
   FitOfRows fit{};
 };
-/// The observations that result without the estimated range offset, the drift of the tracker and
+/// The observations after subtraction of the estimated range offset, the drift of the tracker and
 /// the errors of two axes.
 [[nodiscard]] Observations without_run_effects(Observations, const Solution&);
 
-/// The solution with the misfit that the residuals show (VolumetricModel::misfit()), in the
-/// covariance of the model, too. The notes of the observations describe it. Unchanged without
-/// misfit.
+/// Finds the misfit in the residuals and returns the solution with it (VolumetricModel::misfit()),
+/// also in the covariance of the model. Adds notes about it to the observations. The solution is
+/// unchanged if there is no misfit.
 [[nodiscard]] Result<Solution> with_misfit(Solution, Observations&);
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});
-/// The same with information_of() all rows, where it is known.
+/// solve() with information_of() all rows, if it is already known.
 [[nodiscard]] Result<Solution> solve(const Observations&, const RowInformation&, const Options&);
 
 }  // namespace abbe::calib::otf

@@ -1,11 +1,11 @@
 #pragma once
 /// The unknowns that all positions of the bar share:
 /// 1. the parameters of the model that datum G2 leaves free: the conditions K U = 0 of each table
-/// express one of its nodes by the others (in general this node is zero),
+///    express one of its nodes by the others (in general this node is zero),
 /// 2. the error of the calibration of the bar, as g with dO = F g, F F^T = covariance, g ~ N(0, 1),
 /// 3. the error of alpha, divided by its standard uncertainty, ~ N(0, 1),
 /// 4. the error of the temperatures that is common to all positions, divided by its standard
-/// uncertainty, ~ N(0, 1).
+///    uncertainty, ~ N(0, 1).
 
 #include <Eigen/Core>
 #include <vector>

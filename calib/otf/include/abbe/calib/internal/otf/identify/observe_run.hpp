@@ -1,5 +1,6 @@
 #pragma once
-/// Observations of a whole run: of its mode, with its visits of reference nests. Pure.
+/// Computes the observations of a whole run in its mode, together with its visits of reference
+/// nests. Pure.
 
 #include <span>
 
@@ -8,11 +9,11 @@
 
 namespace abbe::calib::otf {
 
-/// On the fly: observations of aligned_segments(); in standstill mode those of
-/// observe_standstills().
+/// Observations of aligned_segments() in on-the-fly mode; those of observe_standstills() in
+/// standstill mode.
 [[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&,
                                            const Path&, const Noise&, const Options& = {});
-/// The same on the fly, from the segments of the run.
+/// Observations in on-the-fly mode, from the segments of the run.
 [[nodiscard]] Result<Observations> observe_with_nests(const AlignedSegments&, const Machine&,
                                                       const Path&, const Noise&, const Options&);
 

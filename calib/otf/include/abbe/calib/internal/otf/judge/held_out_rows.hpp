@@ -1,6 +1,6 @@
 #pragma once
-/// Rows of a run that a fit did not use: which legs may be held out, and what remains of their
-/// residuals after removal of the best-fit rigid motion (judge.hpp).
+/// Rows of a run that a fit did not use: selects the legs that may be held out, and computes the
+/// residuals that remain after removal of the best-fit rigid motion (judge.hpp).
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -111,15 +111,17 @@ std::vector<double> residuals_of_rows(const Observations& o, std::span<const std
 struct HeldOutSums {
   Remainder none, candidate, candidate_beside_other, other;
 
-  /// `predicted_m(row)`: the prediction of the candidate, which was not fitted to `rows`.
-  /// `left(row, none_m, candidate_m)` gets what remains of the residuals of each row.
-  /// `effect_m(row)`: effect of the run on y of the row that no model predicts.
+  /// Adds the held-out `rows` of a fold. `predicted_m(row)`: the prediction of the candidate, which
+  /// was not fitted to `rows`. `left(row, none_m, candidate_m)` is called with the remaining
+  /// residuals of each row. `effect_m(row)`: effect of the run on y of the row that no model
+  /// predicts.
   template <class Prediction, class Left, class Effect = double (*)(std::size_t)>
   void add(
       const Observations& o, std::span<const std::size_t> rows, Prediction predicted_m,
       const VolumetricModel* other_model, Left left,
       Effect effect_m = [](std::size_t) { return 0.0; }) {
-    // A best-fit rigid motion fits as few rows as it has unknowns exactly.
+    // Not used: a best-fit rigid motion would fit these rows exactly, because they are not more
+    // than its unknowns.
     if (rows.size() <= kRigidUnknowns) {
       return;
     }

@@ -1,6 +1,6 @@
 #pragma once
-/// The component along the direction of travel, from scale readings beside the tracker's points. A
-/// segment that was measured at constant speed gives a third row:
+/// The component along the direction of travel, from scale readings recorded in addition to the
+/// tracker's points. A segment that was measured at constant speed gives a third row:
 ///     y = a1 . (p - q(t_m)),   sigma^2 = sigma_1^2 / n + (v sigma_t)^2 f
 /// a1: direction of travel of the target, p: measured point in the machine, target offset
 /// subtracted, q: scale readings at the machine's time t_m of the segment (RunClock), n: samples in
@@ -9,12 +9,12 @@
 /// the row is that of a2 and a3, along a1. Corrections of offset and drift of the clocks are two
 /// more unknowns, with the columns v and v (t - origin), unless the clocks are known.
 ///
-/// Readings that jump away from their neighbours and back are not used, and rows of up to three
-/// segments beside each other that are off by seven standard deviations are left out: both are
-/// named in the notes.
+/// Two kinds of outliers are left out and named in the notes: readings that jump away from their
+/// neighbours and back, and rows of up to three consecutive segments that deviate by seven standard
+/// deviations.
 ///
-/// q is that of a straight line through the readings of the time of the segment: so the average of
-/// the readings is compared with the average of the samples.
+/// q is taken from a straight line through the readings within the time of the segment, so that the
+/// average of the readings is compared with the average of the samples.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -30,16 +30,17 @@ namespace abbe::calib::otf {
 
 /// Straight line through the readings of a time window.
 struct EncoderLine {
-  Vector3 q_m = Vector3::Zero();  ///< at the requested time
+  Vector3 q_m = Vector3::Zero();  ///< readings at the requested time
   Vector3 v_m_s = Vector3::Zero();
-  /// Of q along the travel, relative to (v sigma_t)^2: 1/m + (t - mean)^2 / S for m readings.
+  /// Variance of q along the travel, relative to (v sigma_t)^2: 1/m + (t - mean)^2 / S for m
+  /// readings.
   double variance = 1.0;
-  double variance_of_v = 0.0;  ///< relative to (v sigma_t)^2, 1/s^2
+  double variance_of_v = 0.0;  ///< variance of v_m_s, relative to (v sigma_t)^2, in 1/s^2
 };
 
-/// ClockMap with the times of both clocks relative to their first ones. A double holds the time of
-/// day since 1970 in steps of 0.24 us: sums with such a time lose the digits that an adjustment of
-/// the clocks needs; differences of two of them do not.
+/// A ClockMap whose times are relative to the first time of each clock. A double holds the time of
+/// day since 1970 in steps of 0.24 us. Sums with such a time lose the digits that an adjustment of
+/// the clocks needs; differences of two such times do not.
 struct RunClock {
   double lag_s = 0.0;        ///< machine's clock at `origin_s`, since `log_start_s`
   double drift = 0.0;        ///< as ClockMap::drift
@@ -51,23 +52,24 @@ struct RunClock {
             map.drift, origin_s, log_start_s};
   }
   [[nodiscard]] ClockMap map() const { return {lag_s + (log_start_s - origin_s), drift, origin_s}; }
-  /// The machine's clock since the first reading.
+  /// Time of the machine's clock since the first reading.
   [[nodiscard]] double since_start_s(double tracker_s) const {
     const double since_origin_s = tracker_s - origin_s;
     return since_origin_s + lag_s + drift * since_origin_s;
   }
 };
 
-/// Readings in the order of time, with times since the first one.
+/// Readings in the order of time. Times are relative to the first reading.
 class EncoderLines {
  public:
   explicit EncoderLines(std::span<const EncoderReading>);
 
-  [[nodiscard]] double period_s() const { return period_s_; }  ///< median
+  [[nodiscard]] double period_s() const { return period_s_; }  ///< median period of the readings
   [[nodiscard]] std::span<const EncoderReading> readings() const { return readings_; }
   [[nodiscard]] double log_start_s() const { return log_start_s_; }  ///< machine's clock
-  /// The line at `at_s` from the readings between `from_s` and `to_s`; through the readings before
-  /// and after if there are fewer than two. nullopt if half of the readings are missing.
+  /// The line at `at_s` from the readings between `from_s` and `to_s`. If there are fewer than two,
+  /// the line through the readings before and after `at_s`. nullopt if half of the readings are
+  /// missing.
   [[nodiscard]] std::optional<EncoderLine> line(double from_s, double at_s, double to_s) const;
 
  private:
@@ -77,11 +79,11 @@ class EncoderLines {
   double log_start_s_ = 0.0, period_s_ = 0.0;
 };
 
-/// Adds the rows to observations across the travel, at a clock that it corrects. The log must
-/// outlive it.
+/// Adds the rows along the direction of travel to observations across it, and corrects the clock.
+/// The log must outlive this object.
 class AlongRows {
  public:
-  /// `clock`: of the log where it is known, otherwise a first estimate.
+  /// `clock`: that of the log if it is known, otherwise a first estimate.
   AlongRows(const EncoderLog& log, const RunClock& clock);
 
   /// The observations with the rows of `across` and a third row for each segment at constant speed.
@@ -91,12 +93,13 @@ class AlongRows {
     return log_->known_clock ? 0 : kClockUnknowns;
   }
   [[nodiscard]] const RunClock& clock() const { return clock_; }
-  /// Adds the correction of offset and drift that an adjustment estimated; none if it is empty.
+  /// Adds the correction of offset and drift that an adjustment estimated; an empty vector changes
+  /// nothing.
   void correct_clock(const Eigen::VectorXd& by);
   /// Factor of the standard uncertainties of the rows.
   [[nodiscard]] double sigma_factor() const { return sigma_factor_; }
   void multiply_sigma(double factor) { sigma_factor_ *= factor; }
-  /// These segments have no row from now on.
+  /// Excludes these segments: added_to() makes no row for them any more.
   void leave_out(std::span<const std::size_t> segments);
   [[nodiscard]] const std::vector<std::size_t>& left_out() const { return left_out_; }
 

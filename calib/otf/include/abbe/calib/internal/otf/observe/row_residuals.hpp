@@ -9,10 +9,10 @@
 
 namespace abbe::calib::otf {
 
-/// y - A U of every row [m]; y itself for an empty U.
+/// The residuals y - A U of all rows [m]; y itself for an empty U.
 [[nodiscard]] std::vector<double> residuals_m(const Observations&, const Eigen::VectorXd& U);
 
-/// Sum of (residual / sigma)^2.
+/// The sum of (residual / sigma)^2 over all rows.
 [[nodiscard]] double chi2(const Observations&, std::span<const double> residual_m);
 
 }  // namespace abbe::calib::otf

@@ -1,5 +1,6 @@
 #pragma once
-/// What the data of a run state about the bends of its tables (smoothness.hpp).
+/// Information of the data of a run about the bends of its tables (smoothness.hpp). is_left_out():
+/// true if the prior is not applied to this bend.
 
 #include <Eigen/Core>
 #include <vector>
@@ -13,20 +14,21 @@ namespace abbe::calib::otf {
 /// Standard deviation of the prior of a bend.
 [[nodiscard]] double sigma_of(const Smoothness&, const TableBend&);
 
-/// Information about all bends if constants, slopes and all other unknowns may have any value.
+/// Information about all bends if all other unknowns, constants and slopes included, may have any
+/// value.
 struct AboutBends {
   std::vector<TableBend> bends;
-  Eigen::MatrixXd H;  ///< of the data with their stated noise
+  Eigen::MatrixXd H;  ///< information matrix of the data with their stated noise
   Eigen::VectorXd g;
   double variance_factor = 1.0;
 };
 [[nodiscard]] AboutBends about_bends(const estimation::Information& data, const TableBasis&,
                                      double variance_factor);
 
-/// The posterior of the bends, each in units of the standard deviation of its prior.
+/// Posterior of the bends. Each bend is divided by the standard deviation of its prior.
 struct BendPosterior {
   Eigen::VectorXd mean;
-  Eigen::MatrixXd Q;  ///< covariance; a bend without the prior has its own unit
+  Eigen::MatrixXd Q;  ///< covariance; left-out bends are divided by sigma_of_unit * 100 um
 };
 [[nodiscard]] BendPosterior posterior_of(const AboutBends&, const Smoothness&);
 

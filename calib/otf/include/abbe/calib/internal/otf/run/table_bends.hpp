@@ -1,5 +1,5 @@
 #pragma once
-/// Bends of the error tables (smoothness.hpp) as coordinates.
+/// One bend of an error table (smoothness.hpp) as a linear function of U.
 
 #include <Eigen/Core>
 #include <array>
@@ -14,18 +14,20 @@ namespace abbe::calib::otf {
 
 struct TableBend {
   ErrorMotion motion;
-  double position_m = 0.0;                    ///< of the middle node
+  double position_m = 0.0;                    ///< position of the middle node
   double from_m = 0.0, to_m = 0.0;            ///< positions of the nodes beside it
-  std::array<estimation::RowEntry, 3> row{};  ///< bend = row . U
-  double sigma_of_unit = 1.0;                 ///< standard deviation of the prior for bend 1 m
+  std::array<estimation::RowEntry, 3> row{};  ///< weights: bend = row . U
+  double sigma_of_unit = 1.0;                 ///< standard deviation of the prior for
+                                              ///< SmoothnessOptions::bend_m = 1 m
 };
-/// Of all inner nodes of all tables, in the order of the unknowns.
+/// Returns the bends at all inner nodes of all tables, in the order of the unknowns.
 [[nodiscard]] std::vector<TableBend> bends_of(const ParameterLayout&);
 
-/// U = U_of (x): the bends in the place of their middle nodes + 1, all other unknowns in their own.
+/// Coordinates x with U = U_of x: at the index of a bend's middle node + 1, x contains the bend; at
+/// all other indices, x contains the unknown itself.
 struct BendCoordinates {
   Eigen::MatrixXd U_of;             ///< unknowns x unknowns
-  std::vector<std::size_t> others;  ///< coordinates that are no bends, ascending
+  std::vector<std::size_t> others;  ///< coordinates that are not bends, ascending
 };
 [[nodiscard]] BendCoordinates bend_coordinates(const std::vector<TableBend>&,
                                                Eigen::Index unknowns);

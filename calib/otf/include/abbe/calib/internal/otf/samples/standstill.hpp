@@ -1,18 +1,17 @@
 #pragma once
-/// Standstills in the stream of a laser tracker: when the target stood still, where, and how much
-/// its samples scatter. With the means of the valid samples in the windows before and after sample
-/// i,
+/// Finds the standstills in the stream of a laser tracker: time, place and scatter of the samples.
+/// With the means of the valid samples in the windows before and after sample i,
 ///     speed = |mean after - mean before| / window
 /// and its noise
 ///     sigma_speed = sigma sqrt(3 (1/n before + 1/n after)) / window,
 /// sigma: noise of one coordinate of a sample, from second differences of the stream. The target
-/// stands at sample i if
+/// stands still at sample i if
 ///     speed <= max(stand_speed, 4 sigma_speed)
-/// A sample far off its two neighbours, and a lost sample, is in no window. A standstill continues
-/// over a short break of the beam if the target is at the same place after it.
+/// A sample far from its two neighbours, and a lost sample, belongs to no window. A standstill
+/// continues over a short beam break if the target is at the same place after it.
 ///
-/// Times are those of the tracker's clock. If the samples of a burst have the time of its delivery
-/// (a few hundred ms between bursts, almost none within one), they are taken as equally spaced.
+/// Times are those of the tracker's clock. If all samples of a burst have the time of its delivery
+/// (a few hundred ms between bursts, almost none within a burst), they are taken as equally spaced.
 ///
 /// Pure; allocates; gives the same bits for the same input on every processor.
 
@@ -25,17 +24,18 @@
 
 namespace abbe::calib::otf {
 
-/// One standstill. Vectors with three components along `axes` are: along the beam, horizontal
-/// across it, vertical across it (of the tracker).
+/// One standstill. The three components of vectors along `axes` are: along the beam, across it
+/// horizontally, across it vertically (in the tracker frame).
 struct Standstill {
   std::size_t first_sample = 0, last_sample = 0;  ///< indices in the stream
   double begin_s = 0.0, end_s = 0.0;              ///< times of these samples
   std::size_t samples = 0;                        ///< number of samples in the mean
-  std::size_t lost_samples = 0;                   ///< invalid ones
-  std::size_t outliers = 0;  ///< more than five robust standard deviations off the others
+  std::size_t lost_samples = 0;                   ///< number of invalid samples
+  std::size_t outliers = 0;  ///< number of samples more than five robust standard deviations from
+                             ///< the others
   Vector3 mean_tracker_m = Vector3::Zero();
   Matrix3 axes_tracker = Matrix3::Identity();  ///< columns: unit vectors, tracker frame
-  /// Standard deviation of one sample along `axes`, linear creep removed.
+  /// Standard deviation of one sample along `axes`, after subtraction of the linear creep.
   Vector3 scatter_m = Vector3::Zero();
   /// Linear motion from the first to the last sample along `axes`; least-squares fit.
   Vector3 creep_m = Vector3::Zero();
@@ -52,15 +52,17 @@ struct Standstills {
   Vector3 correlation = Vector3::Ones();
   double period_s = 0.0;             ///< time between two samples
   double sigma_m = 0.0;              ///< noise of one coordinate of a sample
-  double speed_limit_m_per_s = 0.0;  ///< below it the target stands, for windows without a loss
+  double speed_limit_m_per_s = 0.0;  ///< for windows without a lost sample: below this speed the
+                                     ///< target stands still
   std::size_t samples = 0;
   std::size_t lost_samples = 0;  ///< invalid samples
   std::size_t too_short = 0;     ///< stops that are shorter than least_duration_s
   std::size_t creeping = 0;      ///< slow motions that exceed most_creep_m
 };
 
-/// NotFinite or BadInput for samples that are not numbers or whose time does not ascend (the text
-/// names sample and time). TooFewObservations for a stream without a standstill.
+/// Finds the standstills. NotFinite or BadInput for samples that are not numbers or whose time does
+/// not ascend (the text names sample and time). TooFewObservations for a stream without a
+/// standstill.
 [[nodiscard]] Result<Standstills> find_standstills(std::span<const TrackerObservation>,
                                                    const StandstillOptions& = {});
 

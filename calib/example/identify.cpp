@@ -1,5 +1,5 @@
 // Identifies the errors of a simulated machine from tracker points on the fly, and compares the
-// model with the errors that are known here. All values in SI units.
+// model with the simulated errors. All values in SI units.
 #include <abbe/calib/model/model_comparison.hpp>
 #include <abbe/calib/otf/identify/identify.hpp>
 #include <abbe/calib/otf/plan/plan.hpp>
@@ -14,13 +14,15 @@ namespace {
 using abbe::calib::Vector3;
 namespace otf = abbe::calib::otf;
 
-/// True position minus scale reading: positioning and straightness of X, positioning of Z.
+/// Simulated errors V (true position minus scale reading): positioning and straightness of X,
+/// positioning of Z.
 Vector3 known_V_m(const Vector3& q_m) {
   const double x = q_m.x() / 0.3, z = q_m.z() / 0.4;
   return {8e-6 * x * x, 5e-6 * x * (1.0 - x), -6e-6 * z};
 }
 
-/// Points of a tracker at `tracker_m` while the machine drives the path, standing at both ends.
+/// Simulates the points of a tracker at `tracker_m` while the machine drives the path; it stands
+/// still at both ends.
 std::vector<otf::TrackerObservation> drive(const otf::Machine& machine, const otf::Path& path,
                                            const Vector3& tracker_m, const otf::Noise& noise) {
   constexpr double kFeed_m_per_s = 0.04, kPeriod_s = 0.01, kStand_s = 2.0;
@@ -83,7 +85,7 @@ int main() {
   }
   const abbe::calib::VolumetricModel& model = found->solution.model;
 
-  // One model of the machine differs from another by a rigid motion, which no tracker shows.
+  // Two models of the same machine may differ by a rigid motion, which a tracker cannot determine.
   std::vector<Vector3> places_m, difference_m;
   double before_m = 0.0;
   for (const Vector3& q_m : abbe::calib::tensor_grid(machine.nodes)) {

@@ -9,8 +9,8 @@
 namespace abbe::calib::sparse {
 namespace {
 
-/// If the standard deviation of y relative to its size is at most this, y counts as constant: so
-/// much can come from rounding.
+/// If the standard deviation of y relative to its size is at most this, y counts as constant:
+/// rounding can cause a deviation of this size.
 constexpr double kConstantY = 1e-14;
 
 Result<void> check_shapes(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {

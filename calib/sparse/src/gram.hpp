@@ -11,8 +11,8 @@ namespace abbe::calib::sparse {
 struct GramProblem {
   Standardised design;
   double y_mean = 0.0;
-  double y_rms = 0.0;    ///< about the mean
-  Eigen::VectorXd y;     ///< centred
+  double y_rms = 0.0;    ///< root mean square about the mean
+  Eigen::VectorXd y;     ///< y minus its mean
   Eigen::MatrixXd gram;  ///< X' X / n; exactly symmetric
   Eigen::VectorXd xty;   ///< X' y / n
 
@@ -20,7 +20,7 @@ struct GramProblem {
   [[nodiscard]] double lambda_max() const { return xty.cwiseAbs().maxCoeff(); }
 };
 
-/// BadInput, NotFinite, TooFewObservations as fit_path.
+/// Makes the problem. BadInput, NotFinite, TooFewObservations as fit_path().
 [[nodiscard]] Result<GramProblem> gram_problem(const Eigen::MatrixXd& X, const Eigen::VectorXd& y);
 
 }  // namespace abbe::calib::sparse

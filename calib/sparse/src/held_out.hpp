@@ -1,5 +1,6 @@
 #pragma once
-/// Squared errors of the rows of one fold, with the paths fitted to the other folds.
+/// Computes squared errors of the rows of one fold, predicted by the paths that are fitted to the
+/// other folds.
 
 #include <Eigen/Core>
 #include <vector>
@@ -9,7 +10,7 @@
 
 namespace abbe::calib::sparse {
 
-/// Number and mean of squared errors. add() gives the mean of both sets.
+/// Number and mean of squared errors. add() merges another set: the mean is then that of both sets.
 struct MeanError {
   double count = 0.0;
   double mean = 0.0;
@@ -18,7 +19,8 @@ struct MeanError {
 };
 
 struct HeldOut {
-  std::vector<std::vector<MeanError>> error;  ///< by penalty, then by lambda it reached
+  std::vector<std::vector<MeanError>> error;  ///< by penalty, then by each lambda that its path
+                                              ///< reached
   long sweeps = 0;
 };
 

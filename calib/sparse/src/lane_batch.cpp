@@ -184,7 +184,7 @@ class LaneBatch {
   LaneParameters parameters_;
   std::vector<char> in_use_;        ///< by problem column: nonzero if any path has used it
   std::vector<Index> columns_;      ///< problem column at each place; -1: padding
-  std::vector<std::size_t> place_;  ///< of each problem column in use
+  std::vector<std::size_t> place_;  ///< place of each problem column in use
   std::vector<double> gram_, xty_;
   std::vector<Lanes> b_;
   std::vector<LaneMask> mask_;

@@ -16,14 +16,14 @@ struct PathTask {
   Penalty penalty;
   std::span<const double> lambda;
   bool first_is_empty = false;  ///< lambda[0] is lambda_max: all coefficients are zero there
-  double tolerance = 0.0;       ///< for the change of a coefficient, absolute
+  double tolerance = 0.0;       ///< limit for the change of a coefficient, absolute
   long max_sweeps = 0;
   Eigen::Index max_nonzero = 0;
 };
 
 /// Coefficients in standardised units, for the columns of the Gram problem.
 struct SolvedPath {
-  std::vector<long> sweeps;  ///< of each lambda reached
+  std::vector<long> sweeps;  ///< number of sweeps for each reached lambda
   Eigen::MatrixXd b;         ///< columns x reached
   bool budget_exhausted = false;
 };
@@ -56,7 +56,7 @@ class PathLane {
 
   const GramProblem* problem_;
   PathTask task_;
-  std::size_t at_ = 0;  ///< index of lambda
+  std::size_t at_ = 0;  ///< index of the present lambda
   long total_ = 0;
   bool finished_ = false;
   Shrinkage shrink_;

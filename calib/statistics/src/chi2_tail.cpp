@@ -21,7 +21,7 @@ double log_gamma_of_half(std::size_t k) noexcept {
   return sum;
 }
 
-/// P(a, x) without its factor, for x < a + 1.
+/// The incomplete gamma function P(a, x) without its factor, for x < a + 1.
 double lower_series(double a, double x) noexcept {
   double term = 1.0 / a, sum = term;
   for (int n = 1; n < kMostTerms && term > kDigits * sum; ++n) {
@@ -31,7 +31,7 @@ double lower_series(double a, double x) noexcept {
   return sum;
 }
 
-/// Q(a, x) without its factor, for x >= a + 1: Lentz's method.
+/// The incomplete gamma function Q(a, x) without its factor, for x >= a + 1, by Lentz's method.
 double upper_fraction(double a, double x) noexcept {
   constexpr double kTiny = std::numeric_limits<double>::min() / kDigits;
   double b = x + 1.0 - a, c = 1.0 / kTiny, d = 1.0 / b, fraction = d;

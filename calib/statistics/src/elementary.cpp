@@ -17,7 +17,7 @@ constexpr double kHalfPi_1 = 0x1.921fb544p+0, kHalfPi_2 = 0x1.0b4611a6p-34,
                  kHalfPi_3 = 0x1.3198a2e037073p-69;
 constexpr double kLn2_1 = 0x1.62e42feep-1, kLn2_2 = 0x1.a39ef35793c76p-33;
 
-/// c[0] + c[1] z + c[2] z^2 ...
+/// The polynomial c[0] + c[1] z + c[2] z^2 ...
 template <std::size_t n>
 constexpr double polynomial(const std::array<double, n>& c, double z) noexcept {
   double sum = c[n - 1];
@@ -44,6 +44,7 @@ constexpr std::array<double, n> inverse_factorials(int first, int step, double a
 // The first omitted term of each series is below 1e-18.
 constexpr auto kSine = inverse_factorials<8>(3, 2, -1.0);
 constexpr auto kCosine = inverse_factorials<8>(4, 2, -1.0);
+// Coefficients of the Taylor series in the parentheses:
 //     e^r = 1 + r + r^2 (1/2! + r/3! ...)
 constexpr auto kExponential = inverse_factorials<13>(2, 1, 1.0);
 

@@ -13,7 +13,8 @@
 namespace abbe::calib::verify {
 namespace {
 
-// With fewer points the fitted rigid motion leaves too few degrees of freedom.
+// Least number of points. With fewer points the fitted rigid motion leaves too few degrees of
+// freedom.
 constexpr std::size_t kLeastPoints = 4;
 // This length is below the resolution of any instrument; a ratio R_resmag to a smaller |V_las| is
 // meaningless.
@@ -27,7 +28,7 @@ Vector3 mean_of(std::span<const Vector3> v) {
   return sum / static_cast<double>(v.size());
 }
 
-/// Residuals T measured - wanted, T: the rigid motion for which they are least.
+/// Residuals T measured - wanted, T: best-fit rigid motion.
 Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
                                             std::span<const Vector3> wanted_m) {
   const auto T = fit_rigid(measured_m, wanted_m);
@@ -51,8 +52,8 @@ Result<void> check_step(const ReadingBox& box, const Comparison& c) {
   return {};
 }
 
-/// Multiples of the step inside the validity volume, at least `least_distance_m` from the origin; z
-/// varies fastest.
+/// Grid points inside the validity volume whose coordinates are multiples of the step, at least
+/// `least_distance_m` from the origin; z varies fastest.
 std::vector<Vector3> grid_places(const VolumetricModel& model, const ReadingBox& box,
                                  const Comparison& c) {
   const Vector3 low = (box.centre_m - box.half_width_m).cwiseQuotient(c.step_m),

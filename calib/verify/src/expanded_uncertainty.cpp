@@ -7,7 +7,7 @@
 namespace abbe::calib::verify {
 namespace {
 
-/// |e|^2 / u^2 that is exceeded with probability `tail`, by bisection.
+/// The value that |e|^2 / u^2 exceeds with the probability `tail`, computed by bisection.
 double squares_exceeded_with(double tail) {
   constexpr double kCoordinates = 3.0;
   constexpr std::size_t kCauses = 1;

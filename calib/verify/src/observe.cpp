@@ -48,7 +48,7 @@ Result<void> check_lack_of_fit(const Observations& o, std::span<const MeasuredPo
   return {};
 }
 
-/// Distance of the readings up to which two shots are of one place.
+/// Largest distance of the readings of two shots that belong to one place.
 double same_place_m(std::span<const MeasuredPoint> points) {
   Vector3 low = points.empty() ? Vector3::Zero() : points.front().reading_m, high = low;
   for (const MeasuredPoint& p : points) {
@@ -59,7 +59,8 @@ double same_place_m(std::span<const MeasuredPoint> points) {
 }
 
 /// The shots of each place, in the order of the first shots. A shot belongs to the first place
-/// whose first shot is near enough: a row of points at small distances does not become one place.
+/// whose first shot is near enough. Comparing with the first shot only prevents that a row of
+/// points at small distances becomes one place.
 std::vector<std::vector<std::size_t>> shots_of_places(std::span<const MeasuredPoint> points,
                                                       double same_place_m) {
   std::vector<std::vector<std::size_t>> places;
@@ -77,10 +78,11 @@ std::vector<std::vector<std::size_t>> shots_of_places(std::span<const MeasuredPo
   return places;
 }
 
-/// The mean of the shots.
+/// Mean reading and mean measured point of the shots.
 MeasuredPoint mean_of_place(std::span<const MeasuredPoint> points,
                             const std::vector<std::size_t>& shots) {
-  // Relative to the first shot: the mean of a single shot is the shot, bit by bit.
+  // The mean is computed relative to the first shot, so that the mean of a single shot has the same
+  // bits as the shot.
   MeasuredPoint mean = points[shots.front()];
   Vector3 reading = Vector3::Zero(), measured = Vector3::Zero();
   for (const std::size_t shot : shots) {
@@ -92,7 +94,7 @@ MeasuredPoint mean_of_place(std::span<const MeasuredPoint> points,
   return mean;
 }
 
-/// See Observations::repeatability_m.
+/// Computes Observations::repeatability_m.
 std::optional<double> repeatability_m(std::span<const MeasuredPoint> points,
                                       const Observations& o) {
   if (points.size() == o.shots.size()) {

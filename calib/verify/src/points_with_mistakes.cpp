@@ -22,14 +22,14 @@ constexpr std::size_t kFewestOfMistakes = 4;
 constexpr const char* kMirrored =
     "one axis reversed or two axes swapped (measured points, a left-handed frame)";
 
-/// What points leave.
+/// Residuals of points after a fit.
 struct Left {
   double rms_m = kDoesNotFit;
   double relative = kDoesNotFit;  ///< rms / diagonal of the box around the readings
 };
 
-/// After the best rigid motion (Frame::Machine: after the best shift) from the measured points to
-/// reading + V. Without `errors_at`, V is 0.
+/// Residuals after the best-fit rigid motion (Frame::Machine: best shift) from the measured points
+/// to reading + V. Without `errors_at`, V is 0.
 Left left_by(std::span<const MeasuredPoint> points, Frame frame, const ErrorsAt& errors_at) {
   std::vector<Vector3> from, to;
   for (const MeasuredPoint& p : points) {
@@ -84,7 +84,8 @@ Points in_opposite_order(std::span<const MeasuredPoint> points) {
   return out;
 }
 
-/// The measured point of the next row (`next` 1) or of the row before (-1).
+/// Points in which each row has the measured point of the next row (`next` = 1) or of the previous
+/// row (-1).
 Points one_row_off(std::span<const MeasuredPoint> points, std::ptrdiff_t next) {
   Points out;
   for (std::ptrdiff_t i = 0; i < std::ssize(points); ++i) {
@@ -102,10 +103,11 @@ struct Corrected {
   Points points;
 };
 
-/// A constant of all ranges with which the points fit best; nullopt: too small to be a mistake.
+/// The points with the constant change of all ranges that fits best; nullopt: the change is too
+/// small to be a mistake.
 std::optional<Corrected> with_other_ranges(std::span<const MeasuredPoint> points, Frame frame,
                                            const ErrorsAt& errors_at) {
-  constexpr double kLeast_m = 2e-3;  // a smaller change absorbs another error
+  constexpr double kLeast_m = 2e-3;  // a smaller change only absorbs another error
   const auto with = [&](double change_m) {
     return changed(points, [&](MeasuredPoint& p) {
       p.measured_m = with_longer_range(p.measured_m, change_m);
@@ -157,7 +159,7 @@ struct Fit {
 };
 
 struct Fits {
-  std::vector<TriedCorrection> best;  ///< best first; `left` relative
+  std::vector<TriedCorrection> best;  ///< best first; `left` is Left::relative
   Left as_given;
   std::vector<Fit> of_best;  ///< in the order of `best`
 };
@@ -188,13 +190,14 @@ bool is_proven(const Fit& fit, const Left& given_without_model, std::size_t poin
          (points >= kFewestToExplain && fit.left.relative <= kFarBetter * rigid);
 }
 
-/// In um, with three decimals.
+/// The length in um, rounded to three decimals.
 double um(double length_m) {
   constexpr double kDecimals = 1e3;
   return std::round(kDecimals * kUmPerM * length_m) / kDecimals;
 }
 
-/// Without a model the mirror images fit equally well: one text for all of them.
+/// Names of the best corrections. Without a model all mirror images fit equally well; they are then
+/// combined in one text.
 std::string names(const std::vector<TriedCorrection>& best) {
   constexpr std::size_t kMost = 2;
   std::vector<std::string> texts;

@@ -1,5 +1,4 @@
 #pragma once
-/// The usual mistakes (geometry/usual_mistakes.hpp) in scale readings and measured points.
 
 #include <span>
 #include <string>
@@ -8,9 +7,10 @@
 
 namespace abbe::calib::verify {
 
-/// "; they fit with X and Y swapped (readings)" for points that do not fit a rigid motion. Empty if
-/// no usual mistake explains them. Tests the shots: means of places mix rows that are in the wrong
-/// order.
+/// Tests the usual mistakes (geometry/usual_mistakes.hpp) in scale readings and measured points
+/// that do not fit a rigid motion. Text such as "; they fit with X and Y swapped (readings)"; empty
+/// if no usual mistake explains them. The single shots are tested, because the means of places
+/// would mix rows that are in the wrong order.
 [[nodiscard]] std::string mistakes_that_fit(std::span<const MeasuredPoint>, Frame,
                                             const ErrorsAt& errors_at);
 

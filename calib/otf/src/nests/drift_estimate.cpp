@@ -9,7 +9,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Mean over the pairs of amplitude and repeatability, weighted with their likelihood.
+/// Mean of the estimates over all grid cells (course, amplitude, repeatability), weighted with
+/// their likelihood.
 DriftEstimate mean_estimate(const DriftLikelihood& likelihood, const LikelihoodGrid& grid) {
   constexpr double kLeastWeight = 1e-6;
   const double most = grid.best().log_likelihood;

@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::array kRepeatabilityFactors{1.0, 2.0, 4.0, 8.0};
 constexpr double kLeastAmplitude_m = 0.1e-6;
-constexpr int kAmplitudes = 14;  // doubled from one to the next: up to 0.8 mm
+constexpr int kAmplitudes = 14;  // each is twice the previous one: up to 0.8 mm
 
-/// Eliminates the range offset and makes the rest of P tridiagonal.
+/// Eliminates the range offset from the equations and makes the remaining part of P tridiagonal.
 void make_tridiagonal(ScaledEquations& e, Eigen::Index offsets) {
   const Eigen::Index n = e.b.size() - offsets;
   Eigen::MatrixXd P = e.P.bottomRightCorner(n, n);
@@ -35,7 +35,7 @@ void make_tridiagonal(ScaledEquations& e, Eigen::Index offsets) {
   e.b_tridiagonal = t.matrixQ().adjoint() * b;
 }
 
-/// T: tridiagonal P, c: b in its coordinates.
+/// Log likelihood of the equations for an amplitude a. T: tridiagonal P, c: b in its coordinates.
 ///     ln(likelihood) = -(constant + ln det(I + a^2 T) - a^2 c^T (I + a^2 T)^-1 c) / 2
 double log_likelihood(const ScaledEquations& e, double amplitude_m) {
   const double squared = amplitude_m * amplitude_m;
@@ -58,7 +58,7 @@ double log_likelihood(const ScaledEquations& e, double amplitude_m) {
 
 struct DriftLikelihood::Factors {
   Eigen::VectorXd scale;              ///< D: amplitude, or 1 for the range offset
-  Eigen::LLT<Eigen::MatrixXd> llt{};  ///< of I + D P D
+  Eigen::LLT<Eigen::MatrixXd> llt{};  ///< Cholesky factor of I + D P D
 };
 
 const DriftCell& LikelihoodGrid::best() const {

@@ -1,6 +1,6 @@
 #pragma once
-/// Likelihood of course and amplitude of the drift, of the repeatability of the nests, and of the
-/// positions to which the visits belong (tracker_drift.hpp).
+/// Likelihood of a drift for a course, an amplitude, a repeatability of the nests, and an
+/// assignment of the visits to positions (tracker_drift.hpp).
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -14,7 +14,8 @@
 
 namespace abbe::calib::otf {
 
-/// S d = g of the rows; d: range offset (only if it has a prior), then the coefficients.
+/// The equations S d = g of the rows. d: range offset (only if it has a prior), then the
+/// coefficients of the drift.
 struct DriftEquations {
   Eigen::MatrixXd S{};
   Eigen::VectorXd g{};
@@ -23,19 +24,20 @@ struct DriftEquations {
   [[nodiscard]] Eigen::Index offsets() const { return u_range_offset_m > 0.0 ? 1 : 0; }
 };
 
-/// For each visit the position to which it belongs.
+/// For each visit the index of the position (place) to which it belongs. A nest that moved has
+/// several places.
 using NestPlaces = std::vector<std::size_t>;
 
-/// The equations for one course and one repeatability, with the prior as unit matrix for the
-/// amplitude 1.
+/// The equations for one course and one repeatability. They are scaled so that the prior for the
+/// amplitude 1 is the unit matrix.
 struct ScaledEquations {
   Eigen::MatrixXd P;
   Eigen::VectorXd b;
   double u_m = 0.0;
   DriftCourse course = DriftCourse::Smooth;
 
-  // The same without the range offset, in coordinates in which P is tridiagonal: with it a
-  // likelihood takes O(n) operations.
+  // The equations without the range offset, in coordinates in which P is tridiagonal. In this form
+  // a likelihood takes O(n) operations.
   Eigen::VectorXd diagonal{}, beside_diagonal{}, b_tridiagonal{};
   double constant = 0.0;  ///< part of -2 ln(likelihood) that does not depend on the amplitude
 };
@@ -47,9 +49,9 @@ struct DriftCell {
   double log_likelihood = 0.0;
 };
 
-/// All combinations for the same places.
+/// All combinations of course, amplitude and repeatability for the same places.
 struct LikelihoodGrid {
-  std::vector<ScaledEquations> equations{};  ///< by course and repeatability
+  std::vector<ScaledEquations> equations{};  ///< one for each course and repeatability
   std::vector<DriftCell> cells{};
 
   [[nodiscard]] const DriftCell& best() const;
@@ -62,10 +64,10 @@ struct LikelihoodGrid {
 
 class DriftLikelihood {
  public:
-  /// Both must outlive it.
+  /// Both arguments must outlive this object.
   DriftLikelihood(const DriftObservations&, const DriftEquations&);
 
-  /// NotConverged if `stopped` returns true.
+  /// Computes the likelihood of all combinations. NotConverged if `stopped` returns true.
   [[nodiscard]] Result<LikelihoodGrid> grid(const NestPlaces&, const Stopped& stopped) const;
   [[nodiscard]] Eigen::VectorXd unknowns(const LikelihoodGrid&, const DriftCell&) const;
   [[nodiscard]] Eigen::MatrixXd covariance(const LikelihoodGrid&, const DriftCell&) const;
@@ -78,7 +80,8 @@ class DriftLikelihood {
  private:
   struct Factors;
   [[nodiscard]] ScaledEquations scaled(const NestPlaces&, double u_m, DriftCourse) const;
-  /// Root of the prior of all unknowns times x, and its transpose times x.
+  /// Products with x: the root of the prior of all unknowns times x, and the transposed root times
+  /// x.
   [[nodiscard]] Eigen::MatrixXd root_times(DriftCourse, const Eigen::MatrixXd& x) const;
   [[nodiscard]] Eigen::MatrixXd root_transposed_times(DriftCourse, const Eigen::MatrixXd& x) const;
   [[nodiscard]] Factors factors(const ScaledEquations&, double amplitude_m) const;
@@ -87,7 +90,8 @@ class DriftLikelihood {
   const DriftEquations& equations_;
   DriftBasis basis_;
   NestRows nests_;
-  std::map<DriftCourse, Eigen::MatrixXd> roots_{};  ///< of the prior of one mode, amplitude 1
+  std::map<DriftCourse, Eigen::MatrixXd> roots_{};  ///< root of the prior of one mode, for the
+                                                    ///< amplitude 1
 };
 
 }  // namespace abbe::calib::otf

@@ -19,14 +19,15 @@ std::vector<std::size_t> visits_by_nest(const NestVisits& nests) {
   return count;
 }
 
-/// Mean of the first visit.
+/// Position of a nest: mean of its first visit.
 Vector3 position_of(const NestVisits& nests, std::size_t nest) {
   return std::find_if(nests.found.begin(), nests.found.end(),
                       [&](const NestVisit& v) { return v.nest == nest; })
       ->mean_tracker_m;
 }
 
-/// Distance of a point in the tracker frame to the path; `leg`: the closest one.
+/// Distance from a point in the tracker frame to the path. `leg` receives the index of the closest
+/// leg.
 double distance_to_legs_m(const Observations& o, const Vector3& p_tracker_m, std::size_t& leg) {
   const Vector3 q = o.alignment.T_machine_tracker * p_tracker_m - o.target_offset_m;
   double least_m = std::numeric_limits<double>::infinity();
@@ -40,8 +41,8 @@ double distance_to_legs_m(const Observations& o, const Vector3& p_tracker_m, std
   return least_m;
 }
 
-/// The visits without those on the path: a nest can not be where the target of the machine passes,
-/// so the machine stood there. Adds a note for each nest.
+/// The visits without those on the path, which are not visits: a nest cannot be where the machine's
+/// target passes, so that the machine stood there. Adds a note for each nest concerned.
 std::vector<NestVisit> visits_apart(const Observations& o, const NestVisits& nests,
                                     std::vector<std::string>& notes) {
   constexpr double kOnPath_m = 3e-3;  // as Options::max_alignment_distance_m
@@ -66,7 +67,7 @@ std::vector<NestVisit> visits_apart(const Observations& o, const NestVisits& nes
   return apart;
 }
 
-/// True if three nests with at least two visits are not on a line.
+/// True if three nests with at least two visits each are not on a line.
 bool determine_rotation(const NestVisits& nests, const std::vector<std::size_t>& visits) {
   constexpr double kLeastHeight = 0.1;
   std::vector<Vector3> at;
@@ -90,7 +91,8 @@ bool determine_rotation(const NestVisits& nests, const std::vector<std::size_t>&
   return false;
 }
 
-/// Evenly spaced times from begin to end, and at `zero_s` between them.
+/// Sets the knots: evenly spaced times from `begin_s` to `end_s`, and the time of the first visit
+/// between them.
 void set_knots(DriftObservations& d, double begin_s, double end_s, std::size_t count) {
   const double zero_s = d.visits.front().time_s, duration_s = end_s - begin_s;
   const auto between = [&](double from_s, double to_s) {

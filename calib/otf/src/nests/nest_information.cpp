@@ -11,15 +11,15 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Prior standard deviation of the position of a nest; its value changes only how readily a nest is
-/// taken to have moved.
+/// Standard deviation of the prior of a nest's position. It only affects how much evidence is
+/// needed to find that a nest moved.
 constexpr double kPosition_m = 1e-3;
 
 std::size_t places(const std::vector<std::size_t>& place) {
   return place.empty() ? 0 : *std::max_element(place.begin(), place.end()) + 1;
 }
 
-/// First column with a value, and number of columns to the last one.
+/// First column that is not zero, and number of columns from it to the last one that is not zero.
 std::pair<Eigen::Index, Eigen::Index> columns_with_values(const Eigen::MatrixXd& H) {
   Eigen::Index first = 0, end = H.cols();
   while (first < end && H.col(first).isZero(0.0)) {

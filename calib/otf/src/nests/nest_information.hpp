@@ -1,5 +1,5 @@
 #pragma once
-/// What visits of reference nests tell about the drift of the tracker.
+/// Information of visits of reference nests about the drift of the tracker.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace abbe::calib::otf {
 
-/// Information N about the coefficients c of the drift and N c, with the positions of the nests
-/// eliminated.
+/// Information N about the coefficients c of the drift, and N c, after elimination of the positions
+/// of the nests.
 struct NestInformation {
   Eigen::MatrixXd N;
   Eigen::VectorXd Nc;
@@ -26,22 +26,25 @@ class NestRows {
   /// `place`: for each visit the position to which it belongs. `u_m`: repeatability.
   [[nodiscard]] NestInformation information(const std::vector<std::size_t>& place,
                                             double u_m) const;
-  /// Position that each visit measured, without the drift, relative to the first visit of its nest.
+  /// Position measured by each visit after subtraction of the drift, relative to the first visit of
+  /// its nest.
   [[nodiscard]] std::vector<Vector3> measured_m(const Eigen::VectorXd& c) const;
-  /// Position of each place without drift, relative to the first visit of its nest.
+  /// Position of each place after subtraction of the drift, relative to the first visit of its
+  /// nest.
   [[nodiscard]] std::vector<Vector3> positions(const std::vector<std::size_t>& place, double u_m,
                                                const Eigen::VectorXd& c) const;
-  /// For each visit the size of its residual from the mean position of its place, relative to its
-  /// standard uncertainty for the repeatability u_m; `c`: coefficients.
+  /// For each visit: length of its residual from the mean position of its place, divided by its
+  /// standard uncertainty for the repeatability u_m. `c`: coefficients of the drift.
   [[nodiscard]] std::vector<double> residuals(const std::vector<std::size_t>& place, double u_m,
                                               const Eigen::VectorXd& c) const;
 
  private:
-  /// H: without the columns of knots that are not beside the visit.
+  /// One visit. H: derivatives of the measured position by the coefficients; only the columns of
+  /// the knots next to the visit are stored.
   struct Row {
     Eigen::Index first_column = 0;
     Eigen::MatrixXd H;
-    Vector3 z_m;  ///< relative to the first visit of the nest
+    Vector3 z_m;  ///< measured position relative to the first visit of the nest
     Matrix3 cov_m2;
   };
   [[nodiscard]] Matrix3 weight(std::size_t visit, double u_m) const;

@@ -10,7 +10,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// One place for each nest.
+/// The assignment in which each nest has one place.
 NestPlaces places_of_nests(const DriftObservations& d) {
   NestPlaces place;
   std::vector<std::size_t> nests;
@@ -24,7 +24,7 @@ NestPlaces places_of_nests(const DriftObservations& d) {
   return place;
 }
 
-/// The visits of a place, as indices.
+/// Indices of the visits of a place.
 std::vector<std::size_t> visits_of(const NestPlaces& place, std::size_t at) {
   std::vector<std::size_t> visits;
   for (std::size_t v = 0; v < place.size(); ++v) {
@@ -39,7 +39,8 @@ bool is_used(const NestPlaces& place, std::size_t visit) {
   return std::count(place.begin(), place.end(), place[visit]) > 1;
 }
 
-/// Number of visits before the change of position that explains most of their squares.
+/// Number of visits before the most probable change of position: the change that explains most of
+/// the squared deviations.
 std::size_t likely_change(const std::vector<std::size_t>& visits,
                           const std::vector<Vector3>& measured_m) {
   Vector3 sum = Vector3::Zero(), before = Vector3::Zero();
@@ -62,7 +63,7 @@ std::size_t likely_change(const std::vector<std::size_t>& visits,
   return best;
 }
 
-/// The places if the nest of visit `worst` moved, and if this visit is wrong.
+/// Two alternative assignments: the nest moved at visit `worst`, or only this visit is wrong.
 std::vector<NestPlaces> other_places(const NestPlaces& place, std::size_t worst,
                                      const std::vector<Vector3>& measured_m) {
   const std::vector<std::size_t> visits = visits_of(place, place[worst]);
@@ -79,7 +80,7 @@ std::vector<NestPlaces> other_places(const NestPlaces& place, std::size_t worst,
   return {std::move(alone), std::move(after)};
 }
 
-/// The worst visit of each place with a suspicious residual.
+/// For each place with a suspicious residual: its worst visit.
 std::vector<std::size_t> suspicious_visits(const NestPlaces& place,
                                            const std::vector<double>& residuals) {
   constexpr double kSuspiciousVisit = 4.0;
@@ -99,7 +100,8 @@ std::vector<std::size_t> suspicious_visits(const NestPlaces& place,
   return worst;
 }
 
-/// Places with one more that explain the visits clearly better; nullopt without such places.
+/// Assignment with one more place that explains the visits clearly better; nullopt if there is
+/// none.
 Result<std::optional<PlacesFound>> better_places(const DriftLikelihood& likelihood,
                                                  const PlacesFound& found, const Stopped& stopped) {
   constexpr double kLeastGain = 8.0;
@@ -125,8 +127,8 @@ Result<std::optional<PlacesFound>> better_places(const DriftLikelihood& likeliho
   return better;
 }
 
-/// Another visit of the nest to compare the position with: the last one used before, else the first
-/// one used after, else the one before.
+/// Another visit of the same nest with which the position is compared: the last used visit before
+/// this one, else the first used visit after it, else the visit before it.
 std::optional<std::size_t> visit_to_compare(const DriftObservations& d, const NestPlaces& place,
                                             std::size_t visit) {
   std::optional<std::size_t> before;

@@ -26,7 +26,7 @@ KeptSamples without_aside(std::span<const TrackerObservation> samples,
   return kept;
 }
 
-/// Adds where samples are excluded.
+/// Sets the members of SetAside that state where samples are excluded.
 void add_places(SetAside& a, std::span<const TrackerObservation> samples,
                 const std::vector<bool>& aside, const AlignedSegments& run) {
   std::size_t in_a_row = 0;
@@ -116,7 +116,8 @@ class Screening {
     return run;
   }
 
-  /// Adds the samples that are wrong along the travel, if that component is used.
+  /// Adds the samples that are wrong along the travel, if this component is used
+  /// (Options::encoders).
   [[nodiscard]] std::vector<std::size_t> with_off_time(std::vector<std::size_t> off,
                                                        std::span<const TrackerObservation> samples,
                                                        const AlignedSegments& run) const {
@@ -144,7 +145,7 @@ class Screening {
     ABBE_TRY(valid);
 
     Result<Alignment> alignment = align(series, machine_, path_, options_);
-    options_.progress = {};  // the first alignment has reported it
+    options_.progress = {};  // the first alignment has reported the progress
     ABBE_TRY(alignment);
     return AlignedSegments{std::move(series), *std::move(alignment)};
   }
@@ -154,7 +155,7 @@ class Screening {
   const Path& path_;
   const Noise& noise_;
   Options options_;
-  std::vector<bool> aside_;  ///< one value per sample; empty if none is excluded
+  std::vector<bool> aside_;  ///< for each sample: true if excluded; empty if none is
   SetAside found_;
 };
 

@@ -109,9 +109,9 @@ Pairs pair_up(const SegmentSeries& series, std::span<const Vector3> points,
   return pairs;
 }
 
-/// Upper bound of the travel in beam breaks that the polyline of the measured points does not
-/// contain, because it takes the shortest way: the travel of as many other segments, each with the
-/// mean travel of the polyline.
+/// Upper bound of the travel during beam breaks. The polyline of the measured points does not
+/// contain this travel, because it connects the points on both sides directly. The bound assumes
+/// the mean travel of the polyline for each missing segment.
 double travel_in_breaks_m(const SegmentSeries& series, double measured_m) {
   const auto has_samples = [](const Segment& b) { return b.samples > 0; };
   const auto first = std::find_if(series.segments.begin(), series.segments.end(), has_samples);
@@ -183,7 +183,7 @@ Result<void> refine(Alignment& a, Pairs& pairs, const SegmentSeries& series, con
     pairs = pair_up(series, points, a.leg, path, t, options.corner_m);
     a.iterations = update + 1;
     a.last_rms_m = pairs.rms_m;
-    // The alignment usually converges in about ten updates.
+    // Progress is reported relative to ten updates, the usual number.
     report(options, Stage::Align, std::min(1.0, update / 10.0));
     if (Result<void> running = check_stopped(options.stopped); !running) {
       return running;
@@ -239,7 +239,7 @@ Result<Alignment> align_as_given(const SegmentSeries& series, const Machine& mac
   return a;
 }
 
-/// The series with other points of the tracker.
+/// Returns the series with all points of the tracker replaced by `corrected(point)`.
 template <class Corrected>
 SegmentSeries with_points(SegmentSeries series, const Corrected& corrected) {
   for (Segment& b : series.segments) {
@@ -254,8 +254,8 @@ SegmentSeries with_longer_ranges(const SegmentSeries& series, double longer_m) {
   return with_points(series, [&](const Vector3& p) { return with_longer_range(p, longer_m); });
 }
 
-/// "; they fit with ranges shorter by 19.05 mm (...)"; empty if no change of the ranges makes the
-/// points fit.
+/// Text such as "; they fit with ranges shorter by 19.05 mm (...)"; empty if no change of the
+/// ranges makes the points fit.
 std::string range_change_that_fits(const SegmentSeries& series, const Machine& machine,
                                    const Path& path, const Options& options) {
   Options loose = options;
@@ -265,7 +265,8 @@ std::string range_change_that_fits(const SegmentSeries& series, const Machine& m
     const auto a = align_as_given(with_longer_ranges(series, change_m), machine, path, loose);
     return a ? std::optional(a->last_rms_m) : std::nullopt;
   };
-  // A change of this size is a mistake; a smaller one only absorbs another error of the run.
+  // A change of this size is a mistake. A smaller change that improves the fit only absorbs another
+  // error of the run.
   constexpr double kLeastChange_m = 2e-3, kMostOfRms = 1.0 / 3.0;
   const auto change_m = best_range_change_m(rms_m);
   if (!change_m || std::abs(*change_m) < kLeastChange_m) {

@@ -15,9 +15,9 @@ struct SegmentSpeed {
   double u_m_s = 0.0;
 };
 
-/// Decides which segments were measured at constant speed: segment and both neighbours on its leg
-/// have the median speed of the leg, within 2 % and four standard uncertainties. Where the machine
-/// accelerates, following errors and the delay of the tracker change.
+/// Decides which segments were measured at constant speed. Condition: the segment and both
+/// neighbours on its leg have the median speed of the leg, within 2 % and four standard
+/// uncertainties. During acceleration, following errors and the delay of the tracker change.
 class ConstantSpeed {
  public:
   ConstantSpeed(const Observations& o, std::span<const std::optional<EncoderLine>> lines,
@@ -78,7 +78,7 @@ double sample_variance_m2(const Vector3& direction, const Vector3& beam_m, const
          across_m * across_m * (1.0 - cosine * cosine);
 }
 
-/// The readings at the time of every usable segment.
+/// Lines through the readings at the time of every usable segment.
 std::vector<std::optional<EncoderLine>> lines_of_segments(const EncoderLines& lines,
                                                           const SegmentSeries& series,
                                                           const RunClock& clock) {
@@ -140,7 +140,7 @@ Observations AlongRows::added_to(const Observations& across, const SegmentSeries
     const Segment& segment = series.segments[row.segment];
     const EncoderLine& line = *lines[row.segment];
     const RigidTransform& T = across.alignment.T_machine_tracker;
-    const Vector3 a1 = row.direction.cross(other.direction);  // a2 x a3
+    const Vector3 a1 = row.direction.cross(other.direction);  // a1 = a2 x a3
     const double v_m_s = a1.dot(line.v_m_s), late_m = v_m_s * log_->sigma_time_s;
     const double variance_m2 =
         sample_variance_m2(a1, T.R * segment.mean_tracker_m, noise) / segment.effective_samples() +

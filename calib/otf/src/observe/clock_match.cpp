@@ -12,19 +12,19 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// A used segment: place and direction of travel at a time of the tracker.
+/// A used segment: position and direction of travel, with the time of the tracker's clock.
 struct TimedPoint {
   double time_s = 0.0;
   Vector3 q_m = Vector3::Zero();
   Vector3 direction = Vector3::UnitX();
 };
 
-/// Distances above this do not differ: at the right offset they are below 1 mm, at a wrong one
-/// centimetres.
+/// Larger distances count as this value. At the correct offset of the clocks the distances are
+/// below 1 mm, at a wrong offset they are centimetres.
 constexpr double kFar_m = 0.02;
-constexpr double kTravelPerStep_m = 2e-3;  ///< between two offsets that are compared
-/// Limits of the distances of the points to the readings: median, and 95 % of them. The gate
-/// accepts errors up to 1 mm.
+constexpr double kTravelPerStep_m = 2e-3;  ///< travel between two offsets that are compared
+/// Limits of the median and of the 95 % quantile of the distances between points and readings. The
+/// gate accepts errors up to 1 mm.
 constexpr double kMedianLimit_m = 1e-3, kLimit_m = 3e-3;
 constexpr double kLeastCovered = 0.25;  ///< share of the used segments whose time the log contains
 
@@ -51,7 +51,7 @@ double median_speed_m_s(std::span<const TimedPoint> points) {
   return median(speeds);
 }
 
-/// The readings at equal steps of time; without a value in gaps.
+/// The readings interpolated at equal steps of time; steps in gaps have no value.
 class SteppedLog {
  public:
   SteppedLog(const EncoderLines& lines, double wanted_step_s) {
@@ -69,8 +69,8 @@ class SteppedLog {
     }
   }
 
-  /// The time of the log at the first point for which the sum of squared distances, each limited to
-  /// kFar_m, is smallest.
+  /// Time of the log that belongs to the first point. It is the time with the smallest sum of
+  /// squared distances, each limited to kFar_m.
   [[nodiscard]] double best_start_s(std::span<const TimedPoint> points) const {
     std::vector<std::ptrdiff_t> step_of;
     const double start_s = points.front().time_s;
@@ -91,7 +91,8 @@ class SteppedLog {
   }
 
  private:
-  /// Stops above `least`.
+  /// Sum of squared distances for a shift of the log. The computation stops when the sum exceeds
+  /// `least`.
   [[nodiscard]] double squares_m2(std::span<const TimedPoint> points,
                                   std::span<const std::ptrdiff_t> step_of, std::ptrdiff_t shift,
                                   double least) const {
@@ -101,7 +102,7 @@ class SteppedLog {
       double square = kFar_m * kFar_m;
       if (at >= 0 && at < std::ssize(q_m_)) {
         const double found = (points[i].q_m - q_m_[static_cast<std::size_t>(at)]).squaredNorm();
-        square = found < square ? found : square;  // a gap is far
+        square = found < square ? found : square;  // steps in gaps (NaN) count as kFar_m
       }
       sum += square;
     }
@@ -112,11 +113,12 @@ class SteppedLog {
   std::vector<Vector3> q_m_;
 };
 
-/// Points against readings, for a clock; only of points whose time the log contains.
+/// Comparison of a point with the readings for a given clock; made only for points whose time the
+/// log contains.
 struct PointToLog {
   double time_s = 0.0;
   double distance_m = 0.0;
-  double late_s = 0.0;  ///< correction of the offset from this point
+  double late_s = 0.0;  ///< correction of the offset that follows from this point
 };
 std::vector<PointToLog> compared(std::span<const TimedPoint> points, const EncoderLines& lines,
                                  const RunClock& clock) {
@@ -133,8 +135,8 @@ std::vector<PointToLog> compared(std::span<const TimedPoint> points, const Encod
   return all;
 }
 
-/// Corrects the clock by the medians of the corrections of the first and the last half of the
-/// points; only points that are near.
+/// Corrects the clock by the medians of the corrections from the first and the last half of the
+/// points. Only points near the readings are used.
 void correct(RunClock& clock, std::span<const PointToLog> all) {
   std::vector<PointToLog> near;
   std::copy_if(all.begin(), all.end(), std::back_inserter(near),
@@ -161,7 +163,7 @@ void correct(RunClock& clock, std::span<const PointToLog> all) {
   clock.lag_s += late1_s - drift * (t1_s - clock.origin_s);
 }
 
-/// How well the readings fit with the best clock.
+/// Distances of the readings from the points with the best clock.
 struct ClockFit {
   RunClock clock;
   double median_m = std::numeric_limits<double>::infinity();
@@ -193,7 +195,7 @@ ClockFit fit_at(const RunClock& clock, std::span<const TimedPoint> points,
 }
 
 ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines, double origin_s) {
-  constexpr std::size_t kCompared = 400;  // points determine an offset to 10 ms many times over
+  constexpr std::size_t kCompared = 400;  // points; more than enough for an offset to 10 ms
   std::vector<TimedPoint> few;
   const std::size_t stride = std::max<std::size_t>(1, points.size() / kCompared);
   for (std::size_t i = 0; i < points.size(); i += stride) {
@@ -205,14 +207,15 @@ ClockFit best_fit(std::span<const TimedPoint> points, const EncoderLines& lines,
       .lag_s = SteppedLog(lines, step_s).best_start_s(few) - (few.front().time_s - origin_s),
       .origin_s = origin_s,
       .log_start_s = lines.log_start_s()};
-  constexpr int kCorrections = 4;  // each leaves a tenth, then the errors of the machine
+  constexpr int kCorrections = 4;  // each leaves a tenth of the error, until machine errors
+                                   // dominate
   for (int i = 0; i < kCorrections; ++i) {
     correct(clock, compared(points, lines, clock));
   }
   return fit_at(clock, points, lines);
 }
 
-/// Names the mistakes in the readings whose correction makes them fit.
+/// Names the mistakes in the readings whose correction makes the readings fit.
 std::string mistakes_that_fit(std::span<const TimedPoint> points, const EncoderLog& log,
                               double origin_s) {
   std::vector<std::string> texts;

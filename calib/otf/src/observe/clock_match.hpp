@@ -1,6 +1,6 @@
 #pragma once
-/// First estimate of the offset and the drift of two clocks: the offset for which the scale
-/// readings lie nearest to the tracker's points.
+/// First estimate of offset and drift of the two clocks: the offset for which the scale readings
+/// are closest to the tracker's points.
 
 #include <vector>
 
@@ -8,9 +8,9 @@
 
 namespace abbe::calib::otf {
 
-/// The scale readings fit the points within a fraction of a millimetre, or AlignmentFailed; the
-/// text names reversed or swapped axes and other units of length that would fit. A known clock is
-/// only checked.
+/// Computes the estimate; a known clock is only checked. AlignmentFailed unless the scale readings
+/// then fit the points within a fraction of a millimetre; the text names reversed or swapped axes
+/// and other units of length that would fit.
 [[nodiscard]] Result<RunClock> match_clocks(const EncoderLog&, const Observations& across,
                                             const SegmentSeries&);
 

@@ -8,7 +8,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Readings that are farther apart than this number of periods have a gap between them.
+/// There is a gap between two readings if they are farther apart than this number of periods.
 constexpr double kGapPeriods = 3.0;
 
 double median_period_s(std::span<const EncoderReading> readings) {
@@ -19,7 +19,7 @@ double median_period_s(std::span<const EncoderReading> readings) {
   return median(periods_s);
 }
 
-/// Least squares. At least two readings.
+/// Least-squares line through the readings, at least two.
 EncoderLine line_through(std::span<const EncoderReading> readings, double at_s) {
   const auto n = static_cast<double>(readings.size());
   double mean_s = 0.0;  // relative to at_s

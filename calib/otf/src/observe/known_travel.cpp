@@ -8,7 +8,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Letters of the axes whose direction of travel is unknown: "Y, Z".
+/// Letters of the axes whose direction of travel is unknown, such as "Y, Z".
 std::string axes_without_travel(const AxisTravel& travel) {
   std::string axes;
   for (const Axis axis : kAllAxes) {

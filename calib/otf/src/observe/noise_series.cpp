@@ -13,7 +13,7 @@ NoiseResponse response_of(const Observations& o, const Observation& row) {
   const Vector3 d = T.R.transpose() * row.direction / row.sigma_m;
   const double range_m = p.norm(), level_m = std::sqrt(p.x() * p.x() + p.y() * p.y());
   const Vector3 beam = p / range_m;
-  // directly above the tracker any horizontal direction is that of the azimuth
+  // directly above the tracker the direction of azimuth is arbitrary
   const Vector3 azimuth =
       level_m > 0.0 ? Vector3(-p.y() / level_m, p.x() / level_m, 0.0) : Vector3(Vector3::UnitY());
   return {d.dot(beam), range_m * d.dot(azimuth), range_m * d.dot(beam.cross(azimuth)),

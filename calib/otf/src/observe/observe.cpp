@@ -134,9 +134,9 @@ std::vector<Vector3> sub_points(const SegmentSeries& series, std::size_t i, cons
   return points;
 }
 
-/// First and last measured position of every leg. A vertex itself counts as covered if such a
-/// position is within three corner exclusions of it: between this position and the vertex the model
-/// extrapolates by less than the distance of two nodes.
+/// First and last measured position of every leg, for the validity volume. A vertex counts as
+/// covered if such a position is within three times `corner_m` of it: the model then extrapolates
+/// to the vertex by less than the distance of two nodes.
 std::vector<Vector3> covered(const Observations& o, const Path& path, double corner_m) {
   std::vector<Vector3> points;
   for (std::size_t i = 0; i < o.rows.size();) {

@@ -6,8 +6,8 @@
 
 namespace abbe::calib::otf {
 
-/// BadInput if the travel of a segment is longer than twice Options::corner_m: a segment so long
-/// could extend over a corner and still be used.
+/// BadInput if a segment travels further than twice Options::corner_m: such a segment could extend
+/// over a corner and still be used.
 [[nodiscard]] Result<void> check_travel(const SegmentSeries&, const Options&);
 
 /// observe_segments() from segments whose alignment is known.

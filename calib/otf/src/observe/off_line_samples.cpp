@@ -21,7 +21,7 @@ struct PointAcross {
   Across across{};
 };
 
-/// The points of a segment and of segments beside it, in the path frame of this segment.
+/// Transforms the points of a segment and of its neighbours to the path frame of this segment.
 class FrameOfSegment {
  public:
   FrameOfSegment(const Segment& segment, std::size_t leg, const Alignment& a, const Vector3& t,
@@ -43,10 +43,11 @@ class FrameOfSegment {
   Matrix3 axes_;  ///< columns: a1, a2 / sigma2, a3 / sigma3
 };
 
-/// How far the samples of a segment, or its mean, are from where they should be.
+/// Deviations of the samples of a segment and of its mean, across the travel.
 struct SegmentScatter {
-  Across mad{}, farthest{};  ///< from the median of the segment
-  Across off_means{};        ///< distance of its mean from the line through those before and after
+  Across mad{}, farthest{};  ///< median and largest absolute deviation from the segment's median
+  Across off_means{};        ///< distance of its mean from the line through the means before and
+                             ///< after
 };
 
 class OffLineSearch {
@@ -86,7 +87,7 @@ class OffLineSearch {
     return other < used_.size() && alignment_.leg[used_[k]] == alignment_.leg[used_[other]];
   }
 
-  /// Used segment `next` is on the leg of segment k, with at most one segment that is not used
+  /// True if used segment `next` is on the leg of used segment k, with at most one unused segment
   /// between them.
   [[nodiscard]] bool follows(std::size_t k, std::size_t next) const {
     return on_same_leg(k, next) && used_[next] - used_[k] <= 2;
@@ -129,9 +130,9 @@ class OffLineSearch {
     return scatter;
   }
 
-  /// Scatter of every segment; `scale_` becomes the noise of the run. Segments of fewer than
-  /// kEnough samples show it by their means, of which one and its two neighbours have the variance
-  /// 1.5 / n.
+  /// Computes the scatter of every segment, and the noise of the run (`scale_`). Segments with
+  /// fewer than kEnough samples are judged by their means: the distance of a mean from its two
+  /// neighbours has the variance 1.5 / n.
   void scan() {
     constexpr std::size_t kEnough = 5;
     constexpr double kOfMeans = 1.5;
@@ -174,7 +175,7 @@ class OffLineSearch {
     return off;
   }
 
-  /// One value for each used segment: it must be compared with a line.
+  /// For each used segment: true if it must be compared with a line.
   [[nodiscard]] std::vector<bool> suspicious_segments() const {
     constexpr double kOffLine = 5.0;
     std::vector<bool> all(used_.size(), false);
@@ -194,8 +195,8 @@ class OffLineSearch {
     return all;
   }
 
-  /// Range [begin, end) of used segments of the leg around k: five, or as many as have enough
-  /// samples for a line, at most nine.
+  /// Range [begin, end) of used segments on the leg around k: five, or more (at most nine) until
+  /// they have enough samples for a line.
   [[nodiscard]] std::pair<std::size_t, std::size_t> window(std::size_t k) const {
     constexpr std::size_t kSegments = 5, kMostSegments = 9;
     std::size_t begin = k, end = k + 1, count = series_.segments[used_[k]].samples;

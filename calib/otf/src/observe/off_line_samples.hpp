@@ -1,5 +1,5 @@
 #pragma once
-/// Second step of aligned_segments(): samples off the line through their neighbours.
+/// Result of the second step of aligned_segments(): samples off the line through their neighbours.
 
 #include <span>
 #include <vector>
@@ -17,7 +17,7 @@ struct OffLine {
   };
   std::vector<Noisy> segments;
 };
-/// `series`: segments of `samples`.
+/// Finds the samples. `series`: the segments of `samples`.
 [[nodiscard]] OffLine off_line_samples(std::span<const TrackerObservation> samples,
                                        const SegmentSeries& series, const Alignment&,
                                        const Vector3& target_offset_m, const Path&, const Noise&);

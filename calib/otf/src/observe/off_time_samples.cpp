@@ -11,15 +11,15 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Second differences with half weight, y_i - (y_i-1 + y_i+1) / 2, of white noise have this
-/// variance.
+/// Variance of y_i - (y_i-1 + y_i+1) / 2 for white noise y of variance 1.
 constexpr double kVarianceOffNeighbours = 1.5;
 
-/// One valid sample of a segment or of the segments beside it.
+/// One valid sample of a segment or of its neighbours.
 struct AlongSample {
   std::size_t index = 0;
   double time_s = 0.0;
-  double along = 0.0;  ///< in units of the stated standard deviation of a sample along the travel
+  double along = 0.0;  ///< distance along the leg / stated standard deviation of a sample along the
+                       ///< travel
 };
 
 class OffTimeSearch {
@@ -48,7 +48,7 @@ class OffTimeSearch {
   [[nodiscard]] bool has_neighbours(std::size_t k) const {
     return k > 0 && is_used(k - 1, a_.leg[k]) && is_used(k, a_.leg[k]) && is_used(k + 1, a_.leg[k]);
   }
-  /// Speed from segment k to the next.
+  /// Mean speed along the leg from segment k to segment k + 1.
   [[nodiscard]] double speed_m_s(std::size_t k) const {
     const Segment &from = series_.segments[k], &to = series_.segments[k + 1];
     const RigidTransform& T = a_.T_machine_tracker;
@@ -56,7 +56,7 @@ class OffTimeSearch {
            (to.time_s - from.time_s);
   }
 
-  /// Used segments between used ones, where both speeds are that of the leg.
+  /// Used segments with used neighbours, if the speeds before and after are that of the leg.
   [[nodiscard]] std::vector<std::size_t> at_constant_speed() const {
     constexpr double kSame = 0.02;
     std::vector<std::size_t> all;
@@ -79,7 +79,7 @@ class OffTimeSearch {
     return all;
   }
 
-  /// The valid samples of segment k, and `more` of the segments before and after.
+  /// The valid samples of segment k, and of up to `more` samples before and after it.
   [[nodiscard]] std::vector<AlongSample> samples_of(std::size_t k, std::size_t more) const {
     const Segment& segment = series_.segments[k];
     const std::size_t begin = std::max(series_.segments[k - 1].begin_sample,
@@ -103,7 +103,7 @@ class OffTimeSearch {
     return all;
   }
 
-  /// Distance of sample i from the line through those before and after it.
+  /// Distance of sample i from the line through the samples before and after it.
   [[nodiscard]] static double off_neighbours(const std::vector<AlongSample>& all, std::size_t i) {
     const AlongSample &before = all[i - 1], &here = all[i], &after = all[i + 1];
     const double share = (here.time_s - before.time_s) / (after.time_s - before.time_s);

@@ -1,8 +1,8 @@
 #pragma once
-/// Samples that are wrong along the direction of travel. Across the travel a sample is compared
-/// with the line through its neighbours (off_line_samples.hpp); along it only time shows where it
-/// should be, and only where the speed is constant. The rows along the travel (along_rows.hpp) need
-/// this.
+/// Finds samples that are wrong along the direction of travel, for the rows along the travel
+/// (along_rows.hpp). Across the travel a sample is compared with the line through its neighbours
+/// (off_line_samples.hpp). Along the travel its correct place follows only from time, and only at
+/// constant speed.
 
 #include <cstddef>
 #include <span>
@@ -14,10 +14,11 @@
 
 namespace abbe::calib::otf {
 
-/// Indices of the samples whose distance along their leg is off the line of repeated medians
-/// through those of the neighbours against time, by seven standard deviations; ascending. Standard
-/// deviation: the largest of the stated one, that of the run, and that around the line. Segments
-/// whose speed differs from that of their leg by more than 2 % are not looked at.
+/// Indices of the wrong samples, ascending. The distance along the leg of a sample is compared with
+/// a line against time: repeated medians through its neighbours. A sample is wrong if it deviates
+/// by seven standard deviations. Standard deviation: the largest of the stated one, that of the
+/// run, and that around the line. Segments whose speed differs from that of their leg by more than
+/// 2 % are not tested.
 [[nodiscard]] std::vector<std::size_t> off_time_samples(std::span<const TrackerObservation>,
                                                         const SegmentSeries&, const Alignment&,
                                                         const Path&, const Noise&);

@@ -57,7 +57,7 @@ std::optional<Axis> half_turn_about(const Matrix3& R) {
   return std::nullopt;
 }
 
-/// How the columns x, y, z of the path file would have to be read so that the path is rotated by R:
+/// Text for reading the columns x, y, z of the path file so that the path is rotated by R, such as
 /// "(-y, x, z)".
 std::string columns(const Matrix3& R) {
   std::string text;

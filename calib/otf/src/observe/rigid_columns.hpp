@@ -1,5 +1,4 @@
 #pragma once
-/// Columns of the six rigid unknowns of the tracker station: measured error = V + T + r x p.
 
 #include <cstddef>
 
@@ -8,7 +7,8 @@
 
 namespace abbe::calib::otf {
 
-/// Columns of T and r of a target at p (axis position + target offset, m); `first`: index of tx.
+/// Appends the columns of the six rigid unknowns T and r of the tracker station for a target at p
+/// (axis position + target offset, m): measured error = V + T + r x p. `first`: index of tx.
 inline void append_rigid_columns(ModelColumns& columns, std::size_t first, const Vector3& p_m) {
   const Matrix3 rotation = rotation_effect(p_m);
   for (Eigen::Index k = 0; k < 3; ++k) {

@@ -1,5 +1,4 @@
 #pragma once
-/// When a run began and ended, and the times of its segments or standstills.
 
 #include <vector>
 
@@ -8,7 +7,7 @@
 
 namespace abbe::calib::otf {
 
-/// Times of the tracker's clock.
+/// Begin and end of a run, and the times of its segments or standstills, in the tracker's clock.
 struct RunTimes {
   double begin_s = 0.0, end_s = 0.0;
   std::vector<double> of_segment_s{};  ///< by Observation::segment

@@ -115,7 +115,7 @@ class SegmentCutter {
     }
 
     if (segment.samples > 0) {
-      // relative to the first: the sum of absolute times would lose digits
+      // relative to the first time, because the sum of absolute times would lose digits
       for (const double time_s : times_s_) {
         segment.time_s += time_s - times_s_.front();
       }
@@ -155,9 +155,10 @@ class SegmentCutter {
   const Options& options_;
   SegmentSeries series_;
   std::vector<const Vector3*> in_segment_;
-  std::vector<double> times_s_;  ///< of the samples in_segment_
+  std::vector<double> times_s_;  ///< times of the samples in in_segment_
   std::size_t ticks_ = 0;
-  std::size_t added_ = 0, closed_ = 0;  ///< samples: so far, and in closed segments
+  std::size_t added_ = 0, closed_ = 0;  ///< number of samples so far, and of samples in closed
+                                        ///< segments
   std::size_t lost_in_a_row_ = 0;
 };
 

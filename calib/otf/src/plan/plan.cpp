@@ -33,7 +33,7 @@ Result<void> check_budget(const PathBudget& budget, const PlanOptions& options) 
   return {};
 }
 
-/// Whether a run along the path can be aligned and identified.
+/// True if a run along the path can be aligned and identified.
 bool is_sufficient(const Path& path, const PlannedRun& run) {
   return check(path) && check_observable(path, run.machine, run.backlash);
 }
@@ -48,7 +48,8 @@ Result<Path> walk(const PlanProblem& problem, std::span<const Vector3> lattice,
       });
 }
 
-/// BadInput with the length that a walk on this lattice needs to determine the model.
+/// BadInput for a budget that is too short. The text contains the length that a walk on this
+/// lattice needs to determine the model.
 Result<Path> too_short(const PlanProblem& problem, std::span<const Vector3> lattice,
                        const PlanOptions& options, double walked_m) {
   PathBudget more{.length_m = std::max(walked_m, 1.0)};
@@ -79,8 +80,8 @@ Result<Path> too_short(const PlanProblem& problem, std::span<const Vector3> latt
   return failure(ErrorCode::BadInput, message("plan: the budget is too short: ", walked_m, " m"));
 }
 
-/// Multiples of 0.1 mm inside the travel, or its ends, with the same bits as those of a file with
-/// these numbers in mm.
+/// Rounds the vertices to multiples of 0.1 mm inside the travel, or to its ends. They then have the
+/// same bits as numbers in mm that were read from a file.
 Path rounded(Path path, const MachineNodes& nodes) {
   constexpr double kPerMm = 10.0, kMmPerM = 1e3;
   for (Vector3& q : path.vertices_m) {
@@ -100,13 +101,14 @@ std::size_t corners_reached(const Path& path, const MachineNodes& nodes) {
   return static_cast<std::size_t>(std::count(fixed.begin(), fixed.end(), true));
 }
 
-/// Length of a path before its vertices are rounded, so that it is not too long afterwards.
+/// Longest permitted path before its vertices are rounded; rounding may make it longer by 0.1 mm
+/// per leg.
 double most_before_rounding_m(const PathBudget& budget, const Drive& drive, std::size_t legs) {
   constexpr double kPerLeg_m = 0.1e-3;
   return longest_path_m(budget, drive, legs) - kPerLeg_m * static_cast<double>(legs);
 }
 
-/// Exchange and descent.
+/// Improves the path by exchange and descent (plan.hpp).
 Result<Path> improved(const PlanProblem& problem, Path path, std::span<const Vector3> lattice,
                       const PathBudget& budget, const PlanOptions& options) {
   constexpr std::size_t kSteps = 40;

@@ -3,7 +3,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Least, middle and largest position of each axis as '-', '0' and '+'.
+/// Vertices of the path. '-', '0' and '+': smallest, middle and largest position of an axis.
 constexpr const char* kBaseVertices[] = {
     "---", "+++", "--+", "++-", "---", "+-+", "-+-", "+--", "-++", "+-+", "++-", "-++", "---",
     "+--", "--+", "-+-", "+++", "+--", "++-", "-+-", "---", "--+", "+-+", "+++", "-++", "--+",

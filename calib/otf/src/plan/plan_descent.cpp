@@ -31,19 +31,21 @@ double largest_entry(const VertexVectors& v) {
   return most;
 }
 
-/// Increase of trace(H_leg D) per movement of an end along a coordinate, `sign` +1 or -1.
+/// Derivative of trace(H_leg D) by a movement of one end of the leg along coordinate k, to the side
+/// `sign` (+1 or -1).
 double derivative(const PlanProblem& problem, const Eigen::MatrixXd& D, Leg leg, bool at_end,
                   Eigen::Index k, double sign, double value) {
-  // The rounding of the value, 1e-12, and the curvature, 1/m, are both far below 1e-4.
+  // At this step the rounding of the value (1e-12) and the curvature (1/m) change the derivative by
+  // much less than 1e-4.
   constexpr double kStep_m = 1e-7;
   const std::size_t points = problem.points_of(leg);
   (at_end ? leg.to_m : leg.from_m)[k] += sign * kStep_m;
   return (problem.trace_with(D, leg, points) - value) / kStep_m;
 }
 
-/// Direction of descent of trace(G C): for each coordinate of a vertex the side on which it
-/// decreases more, with its slope; zero where it increases on both sides. The two slopes differ
-/// where a leg lies in a plane of nodes.
+/// Direction of descent of trace(G C): for each coordinate of a vertex the side on which the value
+/// decreases more, with its slope; zero if the value increases on both sides. The slopes on both
+/// sides differ if a leg lies in a plane of nodes.
 VertexVectors descent(const PlanProblem& problem, const PathState& state, const Path& path) {
   VertexVectors up(path.vertices_m.size(), Vector3::Zero()), down = up;
   for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
@@ -77,7 +79,7 @@ VertexVectors gradient_of_length(const Path& path) {
   return g;
 }
 
-/// The travel of the axes.
+/// Box of the travel of the axes.
 struct TravelBox {
   Vector3 low_m, high_m;
 };
@@ -92,7 +94,8 @@ TravelBox box_of(const MachineNodes& nodes) {
   return box;
 }
 
-/// Sets to zero what would move fixed vertices, or vertices out of the box.
+/// Sets components of the step to zero that would move fixed vertices, or move vertices out of the
+/// box.
 void keep_inside(VertexVectors& step, const Path& path, const std::vector<bool>& fixed,
                  const TravelBox& box) {
   for (std::size_t i = 0; i < step.size(); ++i) {
@@ -137,7 +140,7 @@ Path shortened(Path path, const std::vector<bool>& fixed, double most_m, const T
   return path;
 }
 
-/// Removes from the step the part that makes the path longer.
+/// Removes the component of the step that makes the path longer.
 void keep_length(VertexVectors& step, const Path& path, const std::vector<bool>& fixed,
                  const TravelBox& box) {
   VertexVectors l = gradient_of_length(path);
@@ -161,7 +164,7 @@ void keep_length(VertexVectors& step, const Path& path, const std::vector<bool>&
 
 Result<Path> descend(const PlanProblem& problem, Path path, const std::vector<bool>& fixed,
                      double most_m, std::size_t most_steps, const PlanOptions& options) {
-  // Movement of the farthest vertex in one step.
+  // Largest movement of a vertex in one step: at the beginning, and its limits.
   constexpr double kFirst_m = 0.01, kLargest_m = 0.05, kLeast_m = 0.2e-3;
   const TravelBox box = box_of(problem.run().machine.nodes);
   path = shortened(std::move(path), fixed, most_m, box);

@@ -28,13 +28,13 @@ bool is_corner(const Vector3& q, const MachineNodes& nodes) {
 
 enum class ExchangeKind { Remove, Insert, Move, Reverse };
 
-/// One exchange at a vertex: Remove it, Move it to `to`, Insert `to` before it, or Reverse the part
-/// of the path from it to vertex `last`.
+/// One exchange at vertex `vertex`: Remove it, Move it to `to`, Insert `to` before it, or Reverse
+/// the part of the path from it to vertex `last`.
 struct Exchange {
   ExchangeKind kind = ExchangeKind::Remove;
   std::size_t vertex = 0, last = 0;
   Vector3 to = Vector3::Zero();
-  double merit = 0.0;  ///< estimate of value times length
+  double merit = 0.0;  ///< linear estimate of value times length after the exchange
 };
 
 Path exchanged(Path path, const Exchange& e) {
@@ -56,7 +56,7 @@ Path exchanged(Path path, const Exchange& e) {
   return path;
 }
 
-/// Promising exchanges of one path.
+/// Searches exchanges that probably improve a path.
 class ExchangeSearch {
  public:
   ExchangeSearch(const PlanProblem& problem, const Path& path, const PathState& state,
@@ -72,7 +72,7 @@ class ExchangeSearch {
     of_vertex_.resize(v_.size() * v_.size());
   }
 
-  /// In the order of merit.
+  /// Promising exchanges, sorted by merit.
   [[nodiscard]] std::vector<Exchange> found(const std::vector<bool>& fixed) {
     for (std::size_t i = 1; i <= v_.size(); ++i) {
       const bool may_move = i < v_.size() && !fixed[i];
@@ -98,7 +98,7 @@ class ExchangeSearch {
   }
 
  private:
-  /// What a leg is worth: the decrease of the value that it causes, in first order, and its length.
+  /// Effect of a leg: decrease of the value that it causes (to first order), and its length.
   struct Worth {
     double seen_m2 = 0.0, length_m = 0.0;
     Worth operator+(const Worth& o) const { return {seen_m2 + o.seen_m2, length_m + o.length_m}; }
@@ -121,7 +121,7 @@ class ExchangeSearch {
     }
     return *known;
   }
-  /// Of the leg from vertex i to a lattice point; nothing behind the end of the path.
+  /// Effect of the leg from vertex i to a lattice point; zero after the end of the path.
   [[nodiscard]] Worth to_lattice(std::size_t i, std::size_t point) {
     if (i >= v_.size()) {
       return {};
@@ -132,7 +132,7 @@ class ExchangeSearch {
     }
     return *known;
   }
-  /// Of the leg that begins at vertex i; nothing at the end of the path.
+  /// Effect of the leg that begins at vertex i; zero at the end of the path.
   [[nodiscard]] Worth leg_from(std::size_t i) {
     return i + 1 < v_.size() ? between(i, i + 1) : Worth{};
   }
@@ -155,7 +155,7 @@ class ExchangeSearch {
                to_lattice(i - 1, point) + to_lattice(i + 1, point) - leg_from(i - 1) - leg_from(i));
     }
   }
-  /// Short moves along one axis.
+  /// Tries short moves of vertex i along one axis.
   void try_steps(std::size_t i) {
     constexpr double kSteps_m[] = {0.04, 0.015, 0.005};
     const MachineNodes& travel = problem_.run().machine.nodes;
@@ -187,7 +187,8 @@ class ExchangeSearch {
     if (length_m_ + more.length_m > most_m_) {
       return;
     }
-    // The value is convex in H and positive; this agrees with value - more in first order.
+    // The value is a convex and positive function of H. This estimate is also convex and positive,
+    // and agrees with value - more.seen_m2 to first order.
     const double value = more.seen_m2 > 0.0 ? value_m2_ * value_m2_ / (value_m2_ + more.seen_m2)
                                             : value_m2_ - more.seen_m2;
     e.merit = value * (length_m_ + more.length_m);
@@ -201,11 +202,11 @@ class ExchangeSearch {
   const std::vector<Vector3>& v_;
   std::span<const Vector3> lattice_;
   double value_m2_ = 0.0, length_m_ = 0.0, most_m_ = 0.0;
-  std::vector<std::optional<Worth>> of_lattice_, of_vertex_;  ///< computed when they are needed
+  std::vector<std::optional<Worth>> of_lattice_, of_vertex_;  ///< computed when first needed
   std::vector<Exchange> found_;
 };
 
-/// The kind of an exchange and the vertices that it concerns.
+/// Key of an exchange: its kind and the vertices concerned. Used to remember exchanges that failed.
 using ExchangeKey = std::array<double, 13>;
 
 ExchangeKey key_of(const Path& path, const Exchange& e) {
@@ -221,7 +222,7 @@ ExchangeKey key_of(const Path& path, const Exchange& e) {
   return key;
 }
 
-/// Information of the legs between vertices first and last, times `factor`.
+/// Adds the information of the legs between vertices first and last, times `factor`.
 void add_legs(const PlanProblem& problem, const Path& path, std::size_t first, std::size_t last,
               double factor, Eigen::MatrixXd& H) {
   for (std::size_t i = first; i < std::min(last, path.vertices_m.size() - 1); ++i) {
@@ -229,7 +230,7 @@ void add_legs(const PlanProblem& problem, const Path& path, std::size_t first, s
   }
 }
 
-/// Information after an exchange: only the legs that differ are evaluated.
+/// Information H after an exchange; only the legs that differ are evaluated.
 Eigen::MatrixXd information_after(const PlanProblem& problem, const Path& before, const Path& after,
                                   const Exchange& e, Eigen::MatrixXd H) {
   const std::size_t first = e.vertex - 1;
@@ -247,7 +248,8 @@ Eigen::MatrixXd information_after(const PlanProblem& problem, const Path& before
   return H;
 }
 
-/// Whether `later` still means the same after `done`. Its vertex numbers are adapted.
+/// True if the exchange `later` is still valid after `done` was made. Adapts the vertex numbers of
+/// `later`.
 bool adapt(Exchange& later, const Exchange& done) {
   const auto touches = [&](std::size_t vertex) {
     return vertex + 2 >= done.vertex && vertex <= done.vertex + 2;
@@ -263,7 +265,7 @@ bool adapt(Exchange& later, const Exchange& done) {
   return true;
 }
 
-/// value times length: compares paths of different lengths.
+/// Merit of a path: value times length, which allows the comparison of paths of different lengths.
 double merit_of(const PathState& state, const Path& path) {
   return state.value_m2 * lengths_to_vertices_m(path).back();
 }
@@ -287,7 +289,8 @@ std::vector<bool> fixed_vertices(const Path& path, const MachineNodes& nodes) {
 Result<Path> exchange_vertices(const PlanProblem& problem, Path path,
                                std::span<const Vector3> lattice, const PathBudget& budget,
                                const PlanOptions& options) {
-  // A search costs as much as 400 evaluations. After a few exchanges its order is old.
+  // A search takes as much time as 400 evaluations. After a few accepted exchanges its order is no
+  // longer valid.
   constexpr std::size_t kOfOneSearch = 1000, kAccepted = 4;
   constexpr double kBetter = 1.0 - 1e-5;
   const Drive& drive = problem.run().drive;
@@ -339,7 +342,7 @@ Result<Path> exchange_vertices(const PlanProblem& problem, Path path,
       if (!of_earlier_paths) {
         break;
       }
-      failed.clear();  // what failed on an earlier path may succeed on this one
+      failed.clear();  // an exchange that failed on an earlier path may succeed on this one
       of_earlier_paths = false;
     }
   }

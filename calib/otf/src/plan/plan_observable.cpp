@@ -27,7 +27,7 @@ void append_unit_rows(Observations& o, std::size_t leg, const Path& path) {
 
   PointOnPath point;
   point.leg = leg;
-  // A beam along no leg; its length is of no importance.
+  // A beam that is not parallel to any usual leg; its length has no effect.
   point.frame = path_frame(to - from, {0.3, 0.5, 0.8}, {});
   point.frame.sigma2_m = point.frame.sigma3_m = 1.0;
   const auto points = static_cast<std::size_t>(std::ceil(used_m / kSegmentTravel_m));
@@ -46,7 +46,8 @@ void clear_rows(Observations& o) {
   o.sub_points_m.clear();
 }
 
-/// The columns of `null_space`, in datum G2. A combination that no run determines is zero there.
+/// Transforms the columns of `null_space` to datum G2. A combination that no run determines becomes
+/// zero.
 Eigen::MatrixXd in_datum(const Observations& o, const Eigen::MatrixXd& null_space) {
   // unobservable_combinations() has no rows for differences between directions of travel.
   const Eigen::MatrixXd of_layout =
@@ -61,11 +62,11 @@ Eigen::MatrixXd in_datum(const Observations& o, const Eigen::MatrixXd& null_spac
   return S ? Eigen::MatrixXd(*S * null_space) : null_space;
 }
 
-/// Names of the tables and squareness errors with a value in a column of `undetermined`.
-/// Differences between the directions of travel have a prior and so have none.
+/// Names of the tables and squareness errors with a non-zero entry in a column of `undetermined`.
+/// Differences between the directions of travel have a prior, so that their entries are zero.
 std::vector<std::string> names_of(const Observations& o, const Eigen::MatrixXd& undetermined) {
   const ParameterLayout& layout = o.layout();
-  // Columns have unit length; rounding leaves 1e-12.
+  // Limit of an entry that is not zero: columns have unit length, rounding is 1e-12.
   constexpr double kZero = 1e-6;
   const auto occurs = [&](std::size_t first, std::size_t count) {
     return undetermined
@@ -89,7 +90,8 @@ std::vector<std::string> names_of(const Observations& o, const Eigen::MatrixXd& 
   return names;
 }
 
-/// "; X 100 to 300 mm is not reached": parts of the travel of more than one cell.
+/// Text about parts of the travel of more than one cell, such as "; X 100 to 300 mm is not
+/// reached".
 std::string parts_not_reached(const Path& path, const MachineNodes& travel) {
   std::string text;
   for (const Axis a : kAllAxes) {
@@ -126,7 +128,7 @@ std::string listed(const std::vector<std::string>& names) {
 
 Result<Observability> observability(const Path& path, const Machine& machine,
                                     TravelDependence backlash) {
-  Machine linear = machine;  // the rank hardly depends on the interpolation, the time does
+  Machine linear = machine;  // the rank hardly depends on the interpolation, but the time does
   linear.interpolation = Interpolation::Linear;
   Result<Observations> empty = observations_without_rows(linear, path, {}, {}, backlash);
   ABBE_TRY(empty);
@@ -139,7 +141,8 @@ Result<Observability> observability(const Path& path, const Machine& machine,
   Observability result{.needed = o.unknowns() - conditions, .unused = note_on_unused(o)};
   estimation::Information data = with_backlash_prior(estimation::Information(o.unknowns()), o);
 
-  // Further legs never decrease the rank. Groups that grow keep the number of decompositions small.
+  // Further legs never decrease the rank. Groups of increasing size keep the number of rank
+  // decompositions small.
   const std::size_t legs = path.vertices_m.empty() ? 0 : path.vertices_m.size() - 1;
   for (std::size_t leg = *first, group = 32; leg < legs && result.rank < result.needed;
        group *= 2) {

@@ -44,7 +44,7 @@ std::vector<TableUncertainty> uncertainties_of(const ParameterLayout& layout,
   return all;
 }
 
-/// One per table; empty without backlash.
+/// Uncertainty of the differences between directions, one entry per table; empty without backlash.
 std::vector<TableUncertainty> uncertainties_of_backlash(const Observations& o,
                                                         const Eigen::MatrixXd& covariance) {
   std::vector<TableUncertainty> all;
@@ -111,7 +111,8 @@ Result<void> check_all(const Path& path, const PlannedRun& run) {
   return check_observable(path, run.machine, run.backlash);
 }
 
-/// As the adjustment of a run has it: an offset of the ranges is one more unknown with a prior.
+/// Covariance as in the adjustment of a run: an offset of the ranges is an additional unknown with
+/// a prior.
 Eigen::MatrixXd covariance_of(const Observations& o, const Adjustment& a) {
   if (!(o.u_range_offset_m > 0.0)) {
     return a.covariance;

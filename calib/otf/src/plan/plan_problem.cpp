@@ -17,7 +17,7 @@ double corner_exclusion_m() {
   return Options{}.corner_m;
 }
 
-/// sum of row_i row_j M_ij over a symmetric M.
+/// Sum of row_i row_j M_ij for both rows of a point; M is symmetric.
 double quadratic_form(const Eigen::MatrixXd& M, const PointRows& rows) {
   double sum = 0.0;
   for (std::size_t j = 0; j < rows.count; ++j) {
@@ -34,7 +34,7 @@ double quadratic_form(const Eigen::MatrixXd& M, const PointRows& rows) {
   return sum;
 }
 
-/// A M for the rows of all points of a leg, transposed: one column per row.
+/// Transpose of A M for the rows A of all points of a leg: one column per row.
 Eigen::MatrixXd times_rows(const Eigen::MatrixXd& M, std::span<const PointRows> points) {
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(M.rows(), 2 * std::ssize(points));
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -49,7 +49,7 @@ Eigen::MatrixXd times_rows(const Eigen::MatrixXd& M, std::span<const PointRows> 
   return product;
 }
 
-/// A P for P from times_rows(): symmetric, both dimensions the rows of the leg.
+/// A P for P from times_rows(): a symmetric matrix with one row and column per row of the leg.
 Eigen::MatrixXd rows_times(std::span<const PointRows> points, const Eigen::MatrixXd& P) {
   Eigen::MatrixXd product(P.cols(), P.cols());
   for (Eigen::Index column = 0; column < P.cols(); ++column) {
@@ -77,7 +77,8 @@ PlanProblem::PlanProblem(const PlannedRun& run, const ParameterLayout& layout)
   G_ = Eigen::MatrixXd::Zero(n, n);
   G_.topLeftCorner(volume.G().rows(), volume.G().cols()) = volume.G();
 
-  // The eigenvalues of combinations that move V rigidly are zero within rounding.
+  // Eigenvalues of G that count as zero: those of combinations that only move V rigidly are
+  // rounding errors.
   constexpr double kZero = 1e-13;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(G_);
   const Eigen::VectorXd& values = eigen.eigenvalues();
@@ -121,7 +122,7 @@ PointRows PlanProblem::rows_at(const Leg& leg, double share, std::size_t points)
 
 Eigen::MatrixXd PlanProblem::prior() const {
   constexpr double kNode_m = 50e-6, kNode_rad = 100e-6;
-  // Wide: the alignment of a run has no prior.
+  // Wide prior, because the alignment of a run has no prior.
   constexpr double kStation_m = 1e-3, kStation_rad = 1e-3;
   const auto n = static_cast<Eigen::Index>(layout_.fit_size());
   Eigen::VectorXd u = Eigen::VectorXd::Constant(unknowns(), kNode_rad);

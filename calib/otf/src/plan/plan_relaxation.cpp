@@ -10,7 +10,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// A leg that is driven `weight` times.
+/// A leg with the number of times it is driven (`weight`, need not be an integer).
 struct WeightedLeg {
   Leg leg;
   double length_m = 0.0;
@@ -47,7 +47,7 @@ Eigen::MatrixXd information_of_legs(const PlanProblem& problem,
   return H;
 }
 
-/// One step of the algorithm. Legs with a negligible weight are removed.
+/// One step of the multiplicative algorithm. Legs with a negligible weight are removed.
 void reweight(const PlanProblem& problem, const PathState& state, double length_m, double least,
               std::vector<WeightedLeg>& legs) {
   double sum_m = 0.0;

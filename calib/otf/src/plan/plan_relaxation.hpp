@@ -1,7 +1,7 @@
 #pragma once
-/// The best distribution of a length over the legs of a lattice, if legs needed no connections and
-/// could be driven in part: an approximate design in the sense of [Pukelsheim 2006]. No connected
-/// path on the lattice has a smaller trace(G C) than its optimum.
+/// The optimal distribution of a length over the legs of a lattice, under the relaxed condition
+/// that legs need not be connected and can be driven in part: an approximate design in the sense of
+/// [Pukelsheim 2006]. Its trace(G C) is a lower bound for every connected path on the lattice.
 
 #include <Eigen/Core>
 #include <span>
@@ -16,8 +16,8 @@ struct RelaxedDesign {
   double value_m2 = 0.0;    ///< trace(G C)
 };
 
-/// By the multiplicative algorithm: the weight of each leg is multiplied by a power of what a metre
-/// of it is worth, relative to the mean of all. NotConverged if stopped.
+/// Computes the design by the multiplicative algorithm: the weight of each leg is multiplied by a
+/// power of its gain per metre, relative to the mean over all legs. NotConverged if stopped.
 [[nodiscard]] Result<RelaxedDesign> relaxed_design(const PlanProblem&,
                                                    std::span<const Vector3> lattice,
                                                    double length_m, const Stopped&);

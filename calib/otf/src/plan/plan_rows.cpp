@@ -80,7 +80,8 @@ void append_leg(Observations& o, const PlannedLeg& leg, const PlannedRun& run,
   const double corner_m = Options{}.corner_m;
   const std::size_t samples = segment_samples_for_travel(run.drive.feed_m_per_s / run.points_per_s);
   const std::vector<double> along_m = points_along_m(leg.length_m, run);
-  // Segments are counted from the beginning of the run. One that extends over a vertex is not used.
+  // Segments are counted from the beginning of the run. A segment that extends over a vertex is not
+  // used.
   o.samples += static_cast<std::size_t>(run.drive.dwell_s * run.points_per_s);
   const std::size_t begun = o.samples % samples;
   o.samples += along_m.size();

@@ -1,5 +1,4 @@
 #pragma once
-/// The rows that a run along a path will give.
 
 #include <cstddef>
 
@@ -8,8 +7,8 @@
 
 namespace abbe::calib::otf {
 
-/// Observations of the run with y = 0: segments as make_segments() forms them at this feed, without
-/// those near the ends of a leg. Dwells give no segments.
+/// The observations that a run along a path will have, with y = 0. Segments are formed as by
+/// make_segments() at this feed, without those near the ends of a leg. Dwells give no segments.
 [[nodiscard]] Result<Observations> planned_observations(const Path&, const PlannedRun&,
                                                         std::size_t row_points);
 

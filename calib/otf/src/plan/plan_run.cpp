@@ -8,9 +8,9 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// The tracker needs at least this distance to see the reflector.
+/// Least distance at which the tracker can measure the reflector.
 constexpr double kNearest_m = 0.05;
-/// A leg of this length has segments between the corner exclusions of its ends.
+/// Least length of a leg that has segments in spite of Options::corner_m at both ends.
 constexpr double kLeastTravel_m = 0.05;
 
 struct PositiveQuantity {

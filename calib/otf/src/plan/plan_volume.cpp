@@ -32,7 +32,7 @@ RigidFreeVolume::RigidFreeVolume(const ParameterLayout& layout, const Vector3& t
     centre_m_ += q / places;
   }
 
-  // Normal equations of the rigid motion, N x = F U, and of V itself.
+  // Normal matrices of the rigid motion x (N x = F U) and of V itself.
   G_ = Eigen::MatrixXd::Zero(n, n);
   Eigen::MatrixXd F = Eigen::MatrixXd::Zero(6, n);
   Eigen::Matrix<double, 6, 6> N = Eigen::Matrix<double, 6, 6>::Zero();

@@ -9,24 +9,26 @@
 
 namespace abbe::calib::otf {
 
-/// Immutable value.
+/// Computes root mean squares over the volume with G. Immutable.
 class RigidFreeVolume {
  public:
-  /// Over the grid of the nodes, at most 13 per axis. t: target offset.
+  /// Uses the grid of the nodes, at most 13 per axis. t: target offset.
   RigidFreeVolume(const ParameterLayout&, const Vector3& t);
 
-  /// model_size() x model_size()
+  /// Matrix of size model_size() x model_size().
   [[nodiscard]] const Eigen::MatrixXd& G() const { return G_; }
   /// sqrt(trace(G Cov)). `covariance`: its first model_size() rows and columns are used.
   [[nodiscard]] double rms_u_m(const Eigen::MatrixXd& covariance) const;
-  /// Root of the trace of the covariance of V at an axis position, without the rigid motion.
+  /// Standard uncertainty of V at an axis position, without the rigid motion: root of the trace of
+  /// its covariance.
   [[nodiscard]] double u_m(const Vector3& axis_position_m, const Eigen::MatrixXd& covariance) const;
 
  private:
   ParameterLayout layout_;
   Vector3 t_;
-  Vector3 centre_m_ = Vector3::Zero();  ///< of the grid; the rotation is about it
-  Eigen::MatrixXd rigid_of_U_;          ///< 6 x model_size(): the best-fit rigid motion of V
+  Vector3 centre_m_ = Vector3::Zero();  ///< centre of the grid; the rotation is about it
+  Eigen::MatrixXd rigid_of_U_;          ///< 6 x model_size(): best-fit rigid motion of V for given
+                                        ///< U
   Eigen::MatrixXd G_;
 };
 

@@ -13,7 +13,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Undirected legs that the walk has driven, by lattice points.
+/// The legs that the walk has already driven, as pairs of lattice points without direction.
 class DrivenLegs {
  public:
   void add(std::size_t a, std::size_t b) { legs_.insert(std::minmax(a, b)); }
@@ -29,10 +29,10 @@ struct NextLeg {
   std::size_t to = 0;
   Leg leg;
   std::size_t points = 0;
-  double most_gain = 0.0;  ///< upper limit of the gain per length
+  double most_gain = 0.0;  ///< upper bound of the gain per length
 };
 
-/// Legs from lattice point `at` that fit the budget, the one with the largest limit first.
+/// Legs from lattice point `at` that fit the budget, the one with the largest upper bound first.
 std::vector<NextLeg> candidates(const PlanProblem& problem, std::span<const Vector3> lattice,
                                 std::size_t at, const DrivenLegs& driven, double most_m,
                                 const PathState& state) {
@@ -54,7 +54,8 @@ std::vector<NextLeg> candidates(const PlanProblem& problem, std::span<const Vect
   return next;
 }
 
-/// (I + W)^-1 <= I: the linear gain is an upper limit, so that most legs need no decomposition.
+/// The leg with the largest gain. Since (I + W)^-1 <= I, the linear gain is an upper bound of the
+/// gain: most legs can be excluded without a decomposition.
 std::optional<NextLeg> best_of(const PlanProblem& problem, const std::vector<NextLeg>& next,
                                const PathState& state) {
   std::optional<NextLeg> best;

@@ -10,9 +10,9 @@
 
 namespace abbe::calib::otf {
 
-/// Begins at the first lattice point. No leg is driven twice. The length that is left counts as if
-/// it were driven as in `rest`: without it the first legs would be chosen against the prior alone.
-/// Ends where no leg fits the budget, or with NotConverged if stopped.
+/// Makes the walk. It begins at the first lattice point, and no leg is driven twice. The remaining
+/// length is assumed to be driven as in `rest`; otherwise the first legs would be selected by the
+/// prior alone. The walk ends when no leg fits the budget, or with NotConverged if stopped.
 [[nodiscard]] Result<Path> greedy_walk(const PlanProblem&, std::span<const Vector3> lattice,
                                        const PathBudget&, const RelaxedDesign& rest,
                                        const Stopped&);

@@ -6,7 +6,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// The same bend, or one of other nodes at the same place. Neighbours of the same table only touch.
+/// True if `bend` is the bend `sharp`, or one of other nodes at the same place. Neighbouring bends
+/// of a table share nodes but are not the same.
 bool is_at(const Bend& sharp, const TableBend& bend) {
   constexpr double kSame_m = 1e-9;  // rounding of nodes at the same place
   const auto is_inside = [](double x_m, const auto& b) {
@@ -46,13 +47,14 @@ AboutBends about_bends(const estimation::Information& data, const TableBasis& ba
 
 BendPosterior posterior_of(const AboutBends& about, const Smoothness& s) {
   const Eigen::Index n = about.g.size();
-  constexpr double kUnit_m = 100e-6;  // of a bend without the prior
+  constexpr double kUnit_m = 100e-6;  // unit of a bend to which the prior is not applied
   Eigen::VectorXd sigma(n), prior(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const TableBend& bend = about.bends[static_cast<std::size_t>(i)];
     const bool out = is_left_out(s, bend);
     sigma(i) = out ? bend.sigma_of_unit * kUnit_m : sigma_of(s, bend);
-    // A bend that data do not determine has no other information.
+    // A very wide prior for bends that are left out; it only matters for bends that the data do not
+    // determine.
     constexpr double kAlmostNoPrior = 1e-8;
     prior(i) = out ? kAlmostNoPrior : 1.0;
   }

@@ -1,5 +1,6 @@
 #pragma once
-/// Assignment of two sequences of points in which either may have points that the other has not.
+/// Assignment of two sequences of points in which either may have points that the other does not
+/// have.
 
 #include <cstddef>
 #include <optional>
@@ -18,14 +19,15 @@ struct MeasuredPlace {
 };
 
 struct OrderedMatch {
-  /// For each nominal point the index of the measured one.
+  /// For each nominal point the index of the measured point; nullopt: none.
   std::vector<std::optional<std::size_t>> measured_of;
   std::size_t matched = 0;
 };
 
-/// Minimises the sum over pairs of (distance / tolerance)^2, of 1 for every point left over, and of
-/// 0.01 (1 - preference) of the matched points. Pairs keep the order of both sequences and are not
-/// farther apart than the tolerance. Time and memory: measured times nominal.
+/// Minimises the sum of (distance / tolerance)^2 over all pairs, of 1 for every unassigned point,
+/// and of 0.01 (1 - preference) for every matched point. Pairs keep the order of both sequences and
+/// are not farther apart than the tolerance. Time and memory are proportional to measured times
+/// nominal points.
 [[nodiscard]] OrderedMatch match_in_order(std::span<const MeasuredPlace> measured,
                                           std::span<const Vector3> nominal_m, double tolerance_m);
 

@@ -15,8 +15,8 @@ Path times(const Matrix3& M, Path path) {
   return path;
 }
 
-/// Names the reflections after which the path is inside the travel. A rigid fit does not show which
-/// of these reflections is the mistake.
+/// Names the reflections after which the path is inside the travel. The fit of a rigid motion
+/// cannot decide which of them is the mistake.
 std::string reflections(const Path& path, const MachineNodes& travel) {
   std::vector<std::string> texts;
   for (const AxisMistake& mistake : axis_mistakes()) {

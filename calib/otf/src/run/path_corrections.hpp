@@ -10,12 +10,12 @@
 namespace abbe::calib::otf {
 
 /// Names the modified paths for which `fits` returns true: driven backwards, reflected, in another
-/// unit of length. "; they fit with the path driven backwards". Empty if none does.
+/// unit of length. Text such as "; they fit with the path driven backwards"; empty if none fits.
 [[nodiscard]] std::string corrections_that_fit(const Path&, const MachineNodes& travel,
                                                const std::function<bool(const Path&)>& fits);
 
-/// Names the other meanings of the angles for which `fits` returns true: "; they fit with zenith
-/// angles instead of elevations". Empty if none does.
+/// Names the other meanings of the angles for which `fits` returns true. Text such as "; they fit
+/// with zenith angles instead of elevations"; empty if none fits.
 [[nodiscard]] std::string angles_that_fit(const std::function<bool(const AngleMistake&)>& fits);
 
 }  // namespace abbe::calib::otf

@@ -25,8 +25,8 @@ PathFrame path_frame(const Vector3& direction, const Vector3& beam_m, const Nois
   frame.a1 = direction.normalized();
   Vector3 across = perpendicular_part(b, frame.a1);
 
-  // If the path is parallel to the beam, all directions perpendicular to it are equally uncertain,
-  // and any of them can be a2.
+  // If the path is parallel to the beam, all directions perpendicular to it have the same
+  // uncertainty, and any of them can be a2.
   constexpr double kAlongBeam = 1e-6;
   if (across.norm() < kAlongBeam) {
     across = perpendicular_part(least_parallel_axis(frame.a1), frame.a1);

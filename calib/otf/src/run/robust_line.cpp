@@ -21,7 +21,8 @@ RobustLine::RobustLine(std::span<const double> x, std::span<const double> y) {
     part_y.push_back(median_of_part(y, i));
   }
 
-  constexpr double kSamePlace = 1e-6;  // the target stands still, or a wrong point
+  constexpr double kSamePlace = 1e-6;  // closer x are the same place: the target stands still, or a
+                                       // point is wrong
   std::vector<double> slopes, to_others;
   for (std::size_t i = 0; i < parts; ++i) {
     to_others.clear();

@@ -18,10 +18,10 @@ namespace {
 /// Probability that a bend or table is left out although all errors are as smooth as stated.
 constexpr double kSmoothFalseAlarm = 1e-3;
 
-/// The largest size that can be stated.
+/// The largest size of the prior that can be stated.
 constexpr double kWidestBend_m = 1e-3;
 
-/// Rows of the bends of each table that have the prior.
+/// For each table: indices of its bends to which the prior is applied.
 std::vector<std::vector<Eigen::Index>> rows_of_tables(const AboutBends& about,
                                                       const Smoothness& s) {
   std::vector<std::vector<Eigen::Index>> tables;
@@ -39,8 +39,8 @@ std::vector<std::vector<Eigen::Index>> rows_of_tables(const AboutBends& about,
   return tables;
 }
 
-/// Estimate of a bend in units of its standard deviation under the prior; nullopt if the data
-/// hardly determine it.
+/// Estimate of a bend, divided by its standard deviation under the prior; nullopt if the data
+/// hardly determine the bend.
 std::optional<double> times_sigma(const BendPosterior& p, Eigen::Index i) {
   constexpr double kLeast = 1e-3;  // share of the variance
   const double variance = 1.0 - p.Q(i, i);
@@ -48,9 +48,9 @@ std::optional<double> times_sigma(const BendPosterior& p, Eigen::Index i) {
                            : std::nullopt;
 }
 
-/// The bend that fits the prior least, if this is no chance. Steps also increase the estimated
-/// bends of other tables, because the data do not separate all of them: only the largest is
-/// certain.
+/// The bend that agrees least with the prior, if this is significant; else nullopt. Only the
+/// largest bend is returned: a step also increases the estimated bends of other tables, because the
+/// data do not separate all of them.
 std::optional<Bend> sharpest(const AboutBends& about, const Smoothness& s, const BendPosterior& p,
                              const std::vector<Eigen::Index>& rows, double limit) {
   std::optional<Bend> found;
@@ -67,8 +67,9 @@ std::optional<Bend> sharpest(const AboutBends& about, const Smoothness& s, const
   return found;
 }
 
-/// The squares of all bends of a table together: their sum is chi-square with scale and degrees of
-/// freedom of the same mean and variance [Satterthwaite 1946].
+/// True if the sum of squares of all bends of a table is significantly too large. The sum is
+/// compared with a scaled chi-square distribution of the same mean and variance [Satterthwaite
+/// 1946].
 bool is_rough(const BendPosterior& p, const std::vector<Eigen::Index>& rows, double limit) {
   const auto n = static_cast<Eigen::Index>(rows.size());
   const Eigen::MatrixXd B = Eigen::MatrixXd::Identity(n, n) - Eigen::MatrixXd(p.Q(rows, rows));
@@ -81,8 +82,8 @@ bool is_rough(const BendPosterior& p, const std::vector<Eigen::Index>& rows, dou
   return log_chi2_tail(sum * dof / mean, static_cast<std::size_t>(dof)) < natural_logarithm(limit);
 }
 
-/// Number of independent ones with the variance of the sum of squares of these correlated bends, as
-/// in is_rough().
+/// Number of independent bends whose sum of squares would have the same variance as that of these
+/// correlated bends; see is_rough().
 double independent_bends(const BendPosterior& p, const std::vector<Eigen::Index>& rows) {
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(n, n) - Eigen::MatrixXd(p.Q(rows, rows));
@@ -91,11 +92,11 @@ double independent_bends(const BendPosterior& p, const std::vector<Eigen::Index>
   return static_cast<double>(n * n) / correlation.squaredNorm();
 }
 
-/// Clearly more than half of the bends that the data determine are above the median of their
-/// absolute values under the prior. A few steps do not change it. Binomial distribution, of as many
-/// independent bends.
+/// True if significantly more than half of the determined bends exceed the median of their absolute
+/// values under the prior. The test does not react to a few steps. It uses the binomial
+/// distribution for independent_bends() bends.
 bool is_too_narrow(const BendPosterior& p, const std::vector<Eigen::Index>& rows) {
-  constexpr double kMedian = 0.6745;  // standard deviations
+  constexpr double kMedian = 0.6745;  // of |bend|, in standard deviations
   constexpr double kNormal999 = 3.090;
   constexpr double kFewest = 20.0;
   std::vector<Eigen::Index> determined;
@@ -112,7 +113,8 @@ bool is_too_narrow(const BendPosterior& p, const std::vector<Eigen::Index>& rows
 
   const double n = independent_bends(p, determined);
   const double excess = n * (above / static_cast<double>(determined.size()) - 0.5);
-  return excess - 0.5 > kNormal999 * 0.5 * std::sqrt(n);  // normal approximation, continuous
+  return excess - 0.5 > kNormal999 * 0.5 * std::sqrt(n);  // normal approximation with continuity
+                                                          // correction
 }
 
 void leave_out_all(Smoothness& s, const AboutBends& about,
@@ -123,9 +125,9 @@ void leave_out_all(Smoothness& s, const AboutBends& about,
   }
 }
 
-/// Adds what fits the prior least: the sharpest bend; if there is none, the tables that are rough
-/// as a whole; if there are none, all tables, if they are rough together. False if
-/// there is nothing to add.
+/// Leaves out the bends that agree least with the prior: the sharpest bend; if there is none, the
+/// tables that are rough as a whole; if there are none, all tables if they are rough together.
+/// Returns false if nothing was left out.
 bool leave_out_next(Smoothness& s, const AboutBends& about, const BendPosterior& p) {
   const auto tables = rows_of_tables(about, s);
   const double per_bend = kSmoothFalseAlarm / static_cast<double>(about.bends.size()),
@@ -159,7 +161,7 @@ bool leave_out_next(Smoothness& s, const AboutBends& about, const BendPosterior&
   return added;
 }
 
-/// A table with many sharp bends is rough as a whole.
+/// Replaces many sharp bends of a table by an entry for the whole table.
 void join_sharp_bends(Smoothness& s, const AboutBends& about) {
   constexpr double kMany = 0.25;
   for (const TableBend& bend : about.bends) {
@@ -226,7 +228,8 @@ Smoothness smoothness_for(const estimation::Information& data, const TableBasis&
 Result<Smoothness> permitted_smoothness(
     const estimation::Information& data, const TableBasis& basis, const SmoothnessOptions& options,
     double first_factor, const std::function<Result<double>(const Smoothness&)>& factor_with) {
-  constexpr int kMostRounds = 4;  // the variance factor depends little on a permitted prior
+  constexpr int kMostRounds = 4;  // rounds are enough: the variance factor depends little on a
+                                  // permitted prior
   Smoothness s = smoothness_for(data, basis, options, first_factor);
   for (int round = 1;; ++round) {
     const Result<double> factor = factor_with(s);

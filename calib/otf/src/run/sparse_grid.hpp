@@ -8,7 +8,8 @@
 
 namespace abbe::calib::otf {
 
-/// Every n-th node of each axis, with both ends, so that an axis has at most about `cells` cells.
+/// Grid of every n-th node of each axis, including both ends, with at most about `cells` cells per
+/// axis.
 inline std::vector<Vector3> sparse_grid(const MachineNodes& nodes, std::size_t cells) {
   MachineNodes few;
   for (const Axis a : kAllAxes) {

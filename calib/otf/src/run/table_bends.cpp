@@ -6,7 +6,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Distance of the nodes at which the size of the prior is stated, and its factor for rotations.
+/// Distance of nodes for which the size of the prior is stated, and factor of this size for
+/// rotations in rad.
 constexpr double kUnitDistance_m = 0.05, kRotationsInRad = 2.0;
 
 TableBend bend_at(const Table& table, const std::vector<double>& nodes_m, std::size_t node) {

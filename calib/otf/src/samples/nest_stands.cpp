@@ -51,7 +51,7 @@ Vector3 median_position(std::span<const TrackerObservation> samples,
   return median;
 }
 
-/// The samples of a group at which the target stands; empty if it passes.
+/// The samples of a group at which the target stands still; empty if the target only moves past.
 std::vector<std::size_t> standing_samples(std::span<const TrackerObservation> samples,
                                           const NearNest& group, const Noise& noise) {
   constexpr double kStand_m = 50e-6, kSigmas = 6.0;
@@ -70,9 +70,8 @@ double middle_value(std::vector<double> values) {
   return *middle;
 }
 
-/// Tells the target of the machine, which passes or stands near a nest, from the target in the
-/// nest:
-/// the beam needs time to go from one to the other.
+/// Distinguishes the machine's target, which moves or stands near a nest, from the target in the
+/// nest: the beam needs time to move from one to the other.
 class TargetOnMachine {
  public:
   explicit TargetOnMachine(std::span<const TrackerObservation> samples) : samples_(samples) {
@@ -96,7 +95,8 @@ class TargetOnMachine {
     }
   }
 
-  /// True if the samples of a group follow on the valid one before, or the one behind on them.
+  /// True if the target moves continuously into or out of the group: its first sample follows the
+  /// valid sample before it, or the next valid sample follows its last sample (follows()).
   [[nodiscard]] bool goes_on_in(const std::vector<std::size_t>& group) const {
     const std::size_t last = group.size() - 1;
     std::size_t before = group.front(), after = group.back() + 1;
@@ -121,7 +121,8 @@ class TargetOnMachine {
     const double step_s = samples_[k].time_s - samples_[i].time_s;
     return step_s > 0.0 ? distance_m(i, k) / step_s : 0.0;
   }
-  /// `near_m_per_s`: speed beside these two samples.
+  /// True if sample k follows sample i without time for the beam to change the target.
+  /// `near_m_per_s`: speed around these two samples.
   [[nodiscard]] bool follows(std::size_t i, std::size_t k, double near_m_per_s) const {
     constexpr double kMostPeriods = 4.5, kLeastReach_m = 1e-3, kFaster = 3.0;
     const double step_s = samples_[k].time_s - samples_[i].time_s;

@@ -1,6 +1,6 @@
 #pragma once
-/// Places near reference nests at which a target stands in the stream of the tracker, and whether
-/// it is the target of the machine (nest_visits.hpp).
+/// Finds places near reference nests at which a target stands still in the stream of the tracker,
+/// and decides whether it is the machine's target (nest_visits.hpp).
 
 #include <cstddef>
 #include <span>
@@ -16,18 +16,20 @@ struct NearNest {
   std::vector<std::size_t> samples;
 };
 
-/// A group in which the target stands.
+/// A group of samples in which the target stands still.
 struct Stand {
   NearNest group;
-  std::vector<std::size_t> samples{};  ///< at which it stands
+  std::vector<std::size_t> samples{};  ///< samples at which it stands still
   Vector3 mean_m = Vector3::Zero();
-  bool goes_on = false;  ///< before or behind the group, without the time that the beam needs
+  bool goes_on = false;  ///< the target moved into or out of the group without the time that the
+                         ///< beam needs to change the target
 };
 
-/// In the order of time.
+/// Finds the stands, in the order of time.
 [[nodiscard]] std::vector<Stand> stands_near(std::span<const TrackerObservation>,
                                              const std::vector<Nest>&, const Noise&);
-/// True if the target of the machine arrives or leaves at this place, now or at another time.
+/// True if the machine's target moves continuously into or out of this place, in this stand or in
+/// another one.
 [[nodiscard]] bool is_of_machine(const Stand&, const std::vector<Stand>& all);
 
 /// Covariance of one sample.

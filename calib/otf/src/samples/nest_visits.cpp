@@ -63,7 +63,7 @@ Result<void> check_nests(const NestOptions& options) {
   return {};
 }
 
-/// Sum of the variances of the coordinates of means over `count` consecutive samples.
+/// Variances of means over `count` consecutive samples, summed over the three coordinates.
 double variance_of_means(std::span<const TrackerObservation> samples,
                          std::span<const std::size_t> of, std::size_t count) {
   const Vector3 mean = mean_position(samples, of);

@@ -21,7 +21,8 @@ std::vector<double> off_neighbours_m(std::span<const EncoderReading> readings, E
   return off_m;
 }
 
-/// Both neighbours are off by about half as much, to the other side.
+/// True if both neighbours of reading i deviate by about half as much, to the other side: the
+/// reading is a jump and back.
 bool returns(const std::vector<double>& off_m, std::size_t i) {
   constexpr double kLeast = 0.3, kMost = 0.7;
   const auto is_half = [&](double neighbour_m) {
@@ -31,8 +32,8 @@ bool returns(const std::vector<double>& off_m, std::size_t i) {
   return is_half(off_m[i - 1]) && is_half(off_m[i + 1]);
 }
 
-/// Standard deviation of these distances before or after a reading, the larger one: where the axis
-/// starts or stops, only one side moves.
+/// Standard deviation of the distances `off_m` before or after a reading, the larger of both. Where
+/// the axis starts or stops, only one side contains motion.
 double scale_around_m(const std::vector<double>& off_m, std::size_t i) {
   constexpr std::size_t kBeside = 12;
   const auto scale_m = [&](std::size_t begin, std::size_t end) {
@@ -46,8 +47,8 @@ double scale_around_m(const std::vector<double>& off_m, std::size_t i) {
                   scale_m(i + 1, std::min(off_m.size(), i + kBeside + 1)));
 }
 
-/// Standard deviation of the distance of a reading from the line because of its time and those of
-/// its neighbours.
+/// Standard deviation of the distance of a reading from the line that is caused by the errors of
+/// its time and of its neighbours' times.
 double scale_of_times_m(const EncoderLog& log, Eigen::Index axis, std::size_t i) {
   constexpr double kRootOfVariance = 1.2247448713915890;  // sqrt(1.5)
   const EncoderReading &before = log.readings[i - 1], &after = log.readings[i + 1];

@@ -22,8 +22,8 @@ std::optional<Vector3> off_neighbours_m(std::span<const TrackerObservation> samp
 }  // namespace
 
 SampleTimes sample_times(std::span<const TrackerObservation> samples) {
-  constexpr double kPause_s = 1.0;      // a longer step is a break, not the step between bursts
-  constexpr double kWithinBurst = 0.1;  // of the mean step
+  constexpr double kPause_s = 1.0;      // a longer step is a break and not the step between bursts
+  constexpr double kWithinBurst = 0.1;  // limit of a step within a burst, relative to the mean step
   SampleTimes times;
   std::vector<double> steps_s;
   steps_s.reserve(samples.size());
@@ -70,8 +70,8 @@ double sample_noise_m(std::span<const TrackerObservation> samples) {
 
 SampleWindows::SampleWindows(std::span<const TrackerObservation> samples, double sigma_m)
     : count_(samples.size() + 1, 0), sum_(samples.size() + 1, Vector3::Zero()) {
-  constexpr double kFarOff = 15.0;        // standard deviations; motion is left out with them
-  constexpr double kResolution_m = 1e-6;  // of a stream without noise
+  constexpr double kFarOff = 15.0;        // in standard deviations; also excludes fast motion
+  constexpr double kResolution_m = 1e-6;  // limit for a stream without noise
   const double limit_m = kFarOff * std::max(sigma_m, kResolution_m);
   const auto first_valid = std::find_if(samples.begin(), samples.end(),
                                         [](const TrackerObservation& s) { return s.valid; });

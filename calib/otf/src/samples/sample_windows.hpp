@@ -1,5 +1,5 @@
 #pragma once
-/// Times of tracker samples, their noise, and means over windows of them.
+/// Times of the samples of a tracker.
 
 #include <cstddef>
 #include <optional>
@@ -11,20 +11,20 @@
 namespace abbe::calib::otf {
 
 struct SampleTimes {
-  std::vector<double> time_s;  ///< of every sample
+  std::vector<double> time_s;  ///< of each sample
   double period_s = 0.0;       ///< between two samples
 };
-/// Times as given. Those of a stream whose samples have the time of delivery of their burst are
-/// replaced by equally spaced ones: there the steps within a burst are much shorter than the mean
-/// step. Needs two samples.
+/// Returns the times of the samples. In some streams all samples of a burst have the time of its
+/// delivery, so that the steps within a burst are much shorter than the mean step. Such times are
+/// replaced by equally spaced ones. Needs two samples.
 [[nodiscard]] SampleTimes sample_times(std::span<const TrackerObservation>);
 
 /// Standard deviation of one coordinate of a sample, from the median of the second differences of
 /// three successive valid samples; 0 without such samples. Slow motion does not contribute.
 [[nodiscard]] double sample_noise_m(std::span<const TrackerObservation>);
 
-/// Means of valid samples over ranges of indices, by cumulative sums. Single samples far off their
-/// two neighbours are left out.
+/// Means of valid samples over ranges of indices, computed with cumulative sums. Single samples far
+/// from their two neighbours are left out; all others are "in use".
 class SampleWindows {
  public:
   SampleWindows(std::span<const TrackerObservation>, double sigma_m);
@@ -40,8 +40,8 @@ class SampleWindows {
   }
 
  private:
-  std::vector<std::size_t> count_;  ///< in use before sample i
-  std::vector<Vector3> sum_;        ///< of their positions, relative to the first valid sample
+  std::vector<std::size_t> count_;  ///< number of samples in use before sample i
+  std::vector<Vector3> sum_;        ///< sum of their positions, relative to the first valid sample
 };
 
 }  // namespace abbe::calib::otf

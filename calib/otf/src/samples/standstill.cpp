@@ -14,7 +14,7 @@ namespace {
 
 enum class StreamState : unsigned char { Unknown, Stands, Moves };
 
-/// Samples of one standstill; the target stands at the first and at the last one.
+/// First and last sample of a standstill; the target stands still at both.
 struct Stretch {
   std::size_t first = 0, last = 0;
 };
@@ -42,7 +42,7 @@ Result<void> check_samples(std::span<const TrackerObservation> samples) {
   return {};
 }
 
-/// Decides from the windows around a sample whether the target stands.
+/// Decides for each sample, from the windows around it, whether the target stands still.
 class SpeedTest {
  public:
   SpeedTest(std::span<const TrackerObservation> samples, const StandstillOptions& options)
@@ -52,7 +52,7 @@ class SpeedTest {
         window_s_(std::max(options.window_s, kFewestInWindow * times_.period_s)),
         least_speed_m_per_s_(options.stand_speed_m_per_s) {}
 
-  /// For all samples, in one pass.
+  /// States of all samples, computed in one pass.
   [[nodiscard]] std::vector<StreamState> states() const {
     const std::vector<double>& t = times_.time_s;
     const std::size_t n = t.size();
@@ -69,12 +69,12 @@ class SpeedTest {
       states[i] = state(begin, i, end);
     }
 
-    // The first and last samples have one complete window only.
+    // Samples near the ends of the stream have only one complete window.
     fill_ends(states);
     return states;
   }
 
-  /// The target is at the same place at both samples, between which the state is unknown.
+  /// True if the target is at the same place at both samples, between which its state is unknown.
   [[nodiscard]] bool same_place(std::size_t before, std::size_t after) const {
     const std::vector<double>& t = times_.time_s;
     std::size_t begin = before, end = after + 1;
@@ -109,7 +109,8 @@ class SpeedTest {
     return std::max(least_speed_m_per_s_ * window_s_, kOfNoise * noise_m(before, after));
   }
 
-  /// Windows [begin, i] and [i, end). Unknown if one of them has less than half of its samples.
+  /// State at sample i from the windows [begin, i] and [i, end). Unknown if one of them contains
+  /// less than half of its samples.
   [[nodiscard]] StreamState state(std::size_t begin, std::size_t i, std::size_t end) const {
     const std::size_t before = windows_.count(begin, i + 1), after = windows_.count(i, end);
     const double needed = std::max(kFewestInWindow, 0.5 * window_s_ / times_.period_s);
@@ -144,8 +145,8 @@ class SpeedTest {
   double window_s_ = 0.0, least_speed_m_per_s_ = 0.0;
 };
 
-/// Successive samples at which the target stands. A stretch continues over a short time of unknown
-/// state if the target is at the same place after it.
+/// Sequences of samples at which the target stands still. A sequence continues over a short time of
+/// unknown state if the target is at the same place after it.
 std::vector<Stretch> stretches(const SpeedTest& test, double longest_break_s) {
   const std::vector<StreamState> states = test.states();
   const std::vector<double>& t = test.times().time_s;
@@ -185,12 +186,14 @@ std::size_t settled(const Stretch& s, std::span<const double> time_s, double set
 }
 
 bool has_valid_samples(std::span<const TrackerObservation> samples) {
-  constexpr std::ptrdiff_t kFewestInMean = 3;  // mean and slope leave a degree of freedom
+  constexpr std::ptrdiff_t kFewestInMean = 3;  // with fewer samples, mean and slope leave no degree
+                                               // of freedom
   return std::count_if(samples.begin(), samples.end(),
                        [](const TrackerObservation& s) { return s.valid; }) >= kFewestInMean;
 }
 
-/// What a file with one mean for each standstill lacks; empty if the samples are dense enough.
+/// Explains why a file with one mean for each standstill cannot be used; empty if the samples are
+/// dense enough.
 std::string means_text(double period_s, double least_duration_s) {
   if (!(period_s > least_duration_s)) {
     return "";

@@ -10,7 +10,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Mean and linear motion of samples, and their deviations from both.
+/// Straight line through samples as a function of time: mean position and slope.
 struct LinearFit {
   Vector3 mean = Vector3::Zero(), slope = Vector3::Zero();
   double mean_time_s = 0.0;
@@ -42,13 +42,13 @@ LinearFit linear_fit(std::span<const double> time_s, std::span<const Vector3> po
   return fit;
 }
 
-/// Largest deviation of component k from its median that counts as noise.
+/// Range of component k that counts as noise: median and largest deviation from it.
 struct Band {
   double centre = 0.0, half_width = 0.0;
 };
 Band noise_band(std::span<const Vector3> residuals, Eigen::Index k) {
   constexpr double kRobust = 5.0 * kMadToSigma;
-  constexpr double kResolution_m = 1e-7;  // of a stream without noise
+  constexpr double kResolution_m = 1e-7;  // for a stream without noise
   std::vector<double> values;
   values.reserve(residuals.size());
   for (const Vector3& r : residuals) {
@@ -64,7 +64,7 @@ Band noise_band(std::span<const Vector3> residuals, Eigen::Index k) {
   return band;
 }
 
-/// Removes points whose deviation from the fit is outside the noise. Returns their number.
+/// Removes points whose deviation from the fit is larger than noise. Returns their number.
 std::size_t remove_outliers(std::vector<double>& time_s, std::vector<Vector3>& points) {
   const LinearFit fit = linear_fit(time_s, points);
   std::vector<Vector3> residuals;
@@ -93,7 +93,8 @@ std::size_t remove_outliers(std::vector<double>& time_s, std::vector<Vector3>& p
   }
 
   constexpr std::size_t kFewest = 3;
-  if (kept.size() < kFewest) {  // no common noise in the three components
+  if (kept.size() < kFewest) {  // no points remain that are within the noise in all three
+                                // components
     return 0;
   }
 
@@ -103,7 +104,7 @@ std::size_t remove_outliers(std::vector<double>& time_s, std::vector<Vector3>& p
   return removed;
 }
 
-/// Variance of the deviations from mean and creep.
+/// Variance of the residuals after subtraction of mean and creep.
 Vector3 variance(std::span<const Vector3> residuals) {
   Vector3 squares = Vector3::Zero();
   for (const Vector3& r : residuals) {
@@ -170,8 +171,8 @@ StandstillSamples standstill_of(std::span<const TrackerObservation> samples,
 }
 
 void MeanVariances::add(std::span<const Vector3> residual_m) {
-  // The creep that was removed is nearly a motion of the means: they have two degrees of freedom
-  // less than their number.
+  // The subtracted creep is nearly a linear motion of the means. Their degrees of freedom are
+  // therefore their number minus two.
   constexpr std::size_t kFewestMeans = 6, kFitted = 2;
   const Vector3 of_samples = variance(residual_m);
   std::vector<Vector3> means(residual_m.begin(), residual_m.end());

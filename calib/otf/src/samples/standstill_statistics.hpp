@@ -1,5 +1,5 @@
 #pragma once
-/// Mean, scatter, creep and correlation of the samples of standstills.
+/// Computes mean, scatter, creep and correlation of the samples of standstills.
 
 #include <cstddef>
 #include <span>
@@ -13,31 +13,34 @@ namespace abbe::calib::otf {
 /// frame. `p_tracker_m` must not be zero.
 [[nodiscard]] Matrix3 beam_axes(const Vector3& p_tracker_m);
 
-/// A standstill and the deviations of its samples.
+/// A standstill with the residuals of its samples.
 struct StandstillSamples {
   Standstill standstill;
-  /// Deviations of the samples in the mean from mean and creep, along Standstill::axes_tracker.
+  /// Residuals of the samples in the mean after subtraction of mean and creep, along
+  /// Standstill::axes_tracker.
   std::vector<Vector3> residual_m;
 };
-/// Statistics of the valid samples [first, last] without outliers. Outliers are more than five
-/// robust standard deviations off the median in one component, after the linear creep is removed.
-/// At least one sample must be valid.
+/// Statistics of the valid samples in [first, last] without outliers. After subtraction of the
+/// linear creep, an outlier deviates by more than five robust standard deviations from the median
+/// in one component. At least one sample must be valid.
 [[nodiscard]] StandstillSamples standstill_of(std::span<const TrackerObservation>,
                                               std::span<const double> time_s, std::size_t first,
                                               std::size_t last);
 
-/// Sums over standstills of m times the variance of the means of m successive samples, for m = 1,
-/// 2, 4, ...; a mean of n correlated samples has the variance of n / m independent means of m.
+/// For m = 1, 2, 4, ...: sums over standstills of m times the variance of the means of m successive
+/// samples. With a correlated noise that is shorter than m samples, a mean of n samples has the
+/// variance of n / m independent means of m.
 class MeanVariances {
  public:
   void add(std::span<const Vector3> residual_m);
-  /// See Standstills::correlation.
+  /// Largest significant ratio, as defined at Standstills::correlation.
   [[nodiscard]] Vector3 correlation() const;
 
  private:
   struct Level {
     Vector3 of_means = Vector3::Zero();    ///< sum of degrees of freedom times m var(means of m)
-    Vector3 of_samples = Vector3::Zero();  ///< the same degrees of freedom times var(samples)
+    Vector3 of_samples = Vector3::Zero();  ///< sum of the same degrees of freedom times
+                                           ///< var(samples)
     double degrees_of_freedom = 0.0;
   };
   std::vector<Level> levels_;

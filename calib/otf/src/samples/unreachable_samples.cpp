@@ -7,7 +7,7 @@ namespace abbe::calib::otf {
 namespace {
 
 constexpr double kLeastReach_m = 1e-3;
-constexpr double kFaster = 3.0;          // than the usual travel per sample
+constexpr double kFaster = 3.0;          // factor of the usual travel per sample
 constexpr double kMostVariation = 10.0;  // of the travel per sample within a run
 constexpr std::size_t kNeighbours = 8;
 
@@ -21,8 +21,8 @@ double quantile_of(std::vector<double> values, double share) {
   return *at;
 }
 
-/// The valid samples of a run, and what the target can travel between them. A link is a pair of
-/// successive valid samples.
+/// Computes whether the target can have travelled from one valid sample of a run to another. A link
+/// is a pair of successive valid samples.
 class Reach {
  public:
   explicit Reach(std::span<const TrackerObservation> samples) : samples_(samples) {
@@ -52,7 +52,7 @@ class Reach {
     usual_m_ = quantile_of(std::move(travel_m), 0.75);
   }
 
-  /// Median travel per sample over the last links in [begin, end), or the first ones.
+  /// Median travel per sample over the last links in [begin, end); first_m(): over the first links.
   [[nodiscard]] double last_m(std::size_t begin, std::size_t end) const {
     return median_m(std::max(begin, end - std::min(end, kNeighbours)), end);
   }
@@ -60,9 +60,11 @@ class Reach {
     return median_m(begin, std::min(end, begin + kNeighbours));
   }
 
-  /// `local_m`: travel per sample around valid samples i and j.
+  /// True if the target can have travelled from valid sample i to j. `local_m`: travel per sample
+  /// around them.
   [[nodiscard]] bool reaches(std::size_t i, std::size_t j, double local_m) const {
-    // Spikes close together would otherwise enlarge the limit for one another.
+    // The limit prevents spikes that are close together from increasing each other's permitted
+    // travel.
     const double travel_m =
         usual_m_ > 0.0 ? std::clamp(local_m, usual_m_, kMostVariation * usual_m_) : local_m;
     return distance_m(i, j) <= kLeastReach_m + kFaster * periods(i, j) * travel_m;
@@ -92,12 +94,13 @@ class Reach {
   double period_s_ = 0.0, usual_m_ = 0.0;
 };
 
-/// Valid samples [first, last] that the target can have reached one from another.
+/// Range of valid samples [first, last] in which each sample is reachable from the previous one.
 struct ReachablePart {
   std::size_t first = 0, last = 0;
-  double first_m = 0.0, last_m = 0.0;  ///< travel per sample at its ends
-  std::size_t kept = 0;           ///< most samples of a sequence of parts that ends with this one
-  std::size_t before = SIZE_MAX;  ///< part before this one in that sequence
+  double first_m = 0.0, last_m = 0.0;  ///< travel per sample at both ends of the part
+  std::size_t kept = 0;           ///< largest number of samples in a sequence of parts that ends
+                                  ///< with this part
+  std::size_t before = SIZE_MAX;  ///< previous part in that sequence
 };
 
 std::vector<ReachablePart> reachable_parts(Reach& reach) {
@@ -128,9 +131,11 @@ std::vector<ReachablePart> reachable_parts(Reach& reach) {
   return parts;
 }
 
-/// Index of the last part of the sequence with the most samples.
+/// Connects the parts to sequences. Returns the index of the last part of the sequence with most
+/// samples.
 std::size_t link_parts(std::vector<ReachablePart>& parts, const Reach& reach) {
-  constexpr std::size_t kMostBetween = 64;  // parts; limits the time for a run of single spikes
+  constexpr std::size_t kMostBetween = 64;  // number of parts; limits the time for a run with many
+                                            // single spikes
   std::size_t best = 0;
   for (std::size_t k = 0; k < parts.size(); ++k) {
     ReachablePart& part = parts[k];

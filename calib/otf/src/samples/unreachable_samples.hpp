@@ -1,5 +1,5 @@
 #pragma once
-/// First step of aligned_segments(): samples that the target cannot have reached.
+/// First step of aligned_segments(): finds samples that the target cannot have reached.
 
 #include <span>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace abbe::calib::otf {
 
-/// True for each sample that is excluded; empty if there is none. Times ascend.
+/// For each sample true if it is excluded; empty if none is excluded. Times must ascend.
 [[nodiscard]] std::vector<bool> unreachable_samples(std::span<const TrackerObservation>);
 
 }  // namespace abbe::calib::otf

@@ -76,8 +76,8 @@ AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q, double l
   const Eigen::MatrixXd QAWC = Q * CWA_.transpose();
   const Eigen::Index k = CWr_.size();
 
-  // The columns are scaled to unit length. A combination of columns that the model reproduces
-  // except for 1e-6 of its squared length is not determined.
+  // The columns are scaled to unit length. A combination of columns is not determined if the model
+  // reproduces it except for 1e-6 of its squared length.
   constexpr double kFollowed = 1e-6;
   Eigen::VectorXd scale(k);
   for (Eigen::Index i = 0; i < k; ++i) {

@@ -10,22 +10,26 @@
 
 namespace abbe::calib::otf {
 
-/// Sums over the rows of an adjustment that the normal equations for added columns C need.
+/// Sums over the rows of an adjustment from which the normal equations for added columns C are
+/// formed.
 class AddedColumns {
  public:
-  static constexpr std::size_t kMost = 18;  ///< of an alternative (AlternativeColumns)
+  static constexpr std::size_t kMost = 18;  ///< largest number of columns of an alternative
+                                            ///< (AlternativeColumns)
 
   AddedColumns(std::size_t columns, std::size_t unknowns);
   /// `values`: one value per added column in this row.
   void add(const Observation&, std::span<const SparseRows::Entry> row, double residual_m,
            std::span<const double> values);
-  /// The same for a row in which few columns have a value: entries with the index of the column.
+  /// As add(), for a row in which few added columns are not zero. `values`: entries with the index
+  /// of the column.
   void add(const Observation&, std::span<const SparseRows::Entry> row, double residual_m,
            std::span<const SparseRows::Entry> values);
-  /// Adds sums of some of the columns and unknowns; `columns`, `unknowns`: their places here.
+  /// Adds sums for some of the columns and unknowns. `columns`, `unknowns`: their indices in this
+  /// object.
   void add(const AddedColumns& part, const std::vector<std::size_t>& columns,
            const std::vector<std::size_t>& unknowns);
-  /// The sums of the first columns alone.
+  /// The sums of the first `columns` columns only.
   [[nodiscard]] AddedColumns first(std::size_t columns) const;
   AddedColumns& operator+=(const AddedColumns&);
   AddedColumns& operator-=(const AddedColumns&);
@@ -37,8 +41,9 @@ class AddedColumns {
     Eigen::VectorXd u;            ///< standard uncertainty of d
     Eigen::VectorXd dU;           ///< Q A^T W^2 C d: error of U if the columns are left out
     Eigen::MatrixXd root_cov_d;   ///< root of the covariance of d: covariance = root root^T
-    Eigen::MatrixXd root_cov_dU;  ///< of the covariance of dU, and with root_cov_d of both
-    /// With a prior: 2 ln of the marginal likelihood, relative to that without the columns.
+    Eigen::MatrixXd root_cov_dU;  ///< root of the covariance of dU; together with root_cov_d it
+                                  ///< gives the joint covariance of dU and d
+    /// Only with a prior: 2 ln(marginal likelihood with the columns / likelihood without them).
     double twice_log_likelihood = 0.0;
   };
   /// Estimates d without a prior. Uses only the directions of d that decrease chi2 by at least

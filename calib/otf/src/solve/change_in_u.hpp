@@ -1,5 +1,4 @@
 #pragma once
-/// When an iteration of the simultaneous adjustment has converged.
 
 #include <Eigen/Dense>
 #include <cmath>
@@ -8,7 +7,8 @@
 
 namespace abbe::calib::otf {
 
-/// Size of a change of the estimate in units of its standard uncertainty.
+/// Size of a change of the estimate divided by its standard uncertainty (root mean square). The
+/// simultaneous adjustment uses it to decide whether it has converged.
 [[nodiscard]] inline double change_in_u(const Eigen::VectorXd& change,
                                         const estimation::Information& data) {
   const Eigen::VectorXd whitened = data.R() * change;

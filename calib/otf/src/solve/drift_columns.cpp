@@ -5,8 +5,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// The prediction from earlier rows decreases with their age, and so do the entries of the columns
-/// of earlier knots.
+/// Appends the entries of a row that are not negligible. The prediction from earlier rows decreases
+/// with their age, and so do the entries in the columns of earlier knots.
 void append_significant(const auto& row, std::vector<SparseRows::Entry>& out) {
   constexpr double kNegligible = 1e-10;
   const double least = kNegligible * row.cwiseAbs().maxCoeff();

@@ -18,11 +18,12 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Logarithms of the variance of the slow noise of ranges, of angles and of scale readings, in
-/// units of the white noise of the rows, and of the correlation time.
+/// Parameters x of the slow noise. They are the logarithms of the variances of ranges, angles and
+/// scale readings, divided by the white noise of the rows; the last one is the logarithm of the
+/// correlation time.
 using Parameters = Eigen::VectorXd;
 
-/// Which of the sources have the variance of a parameter.
+/// First and last source (noise_series.hpp) to which each variance parameter applies.
 constexpr std::array<std::array<std::size_t, 2>, 3> kSourcesOf{{{0, 0}, {1, 2}, {3, 3}}};
 
 class Scales {
@@ -71,8 +72,9 @@ double least_node_distance_m(const Observations& o) {
   return least_m;
 }
 
-/// Groups contain nearly all that the rows contain about U if they are short compared with the
-/// distance of the nodes, at a third of the cost. 0: the rows are few.
+/// Largest travel of a group of segments; 0 if there are too few rows to group them. Groups that
+/// are short compared with the distance of the nodes contain nearly all information of the rows
+/// about U, and take a third of the time.
 double group_m(const Observations& o) {
   constexpr double kLongestGroup_m = 25e-3, kOfNodeDistance = 0.5;
   constexpr std::size_t kEnoughRows = 10;  // per unknown
@@ -106,8 +108,8 @@ double squares(const RowMatrix& rows) {
   return sum;
 }
 
-/// Slope of log |A^T V^-1 A|, priors included, and the generalised least squares solution, from the
-/// grouped rows.
+/// Derivative of log |A^T V^-1 A| (including priors) by the noise, and the generalised least
+/// squares solution, computed from the grouped rows.
 class AboutUnknowns {
  public:
   AboutUnknowns(const Observations& o, const NoiseSeries& series,
@@ -128,12 +130,13 @@ class AboutUnknowns {
     K_ = (K_ * scale_.asDiagonal()).rowwise().normalized();
   }
 
-  /// Of N = A^T V^-1 A + priors + K^T K = R^T R, unknowns in units of scale_.
+  /// Solution with the triangle R of N = A^T V^-1 A + priors + K^T K = R^T R; the unknowns are
+  /// divided by scale_.
   struct Fit {
     Eigen::MatrixXd R;
     Eigen::VectorXd U;
   };
-  /// `white_factor`: with which the prior for smooth tables is weighted.
+  /// Computes the solution for a noise. `white_factor`: weight of the prior for smooth tables.
   [[nodiscard]] Fit fit(const SlowNoise& noise, double white_factor) const {
     const auto n = scale_.size();
     RowMatrix rows = rows_;
@@ -152,12 +155,12 @@ class AboutUnknowns {
     return found;
   }
 
-  /// Slope of log |N| at the noise x of a fit. Priors and K do not depend on x. With A = W R and
-  /// V = L L^T,
+  /// Derivative of log |N| by the noise parameters x, at the noise of a fit. Priors and K do not
+  /// depend on x. With A = W R and V = L L^T,
   ///     d log |N| = tr(R^-T d(A^T V^-1 A) R^-1) = d |L^-1 W|^2,   |.|^2: sum of squares
   [[nodiscard]] Eigen::VectorXd slope(const Fit& at, const Scales& scales,
                                       const Parameters& x) const {
-    constexpr double kStep = 1e-4;  // of a logarithm
+    constexpr double kStep = 1e-4;  // step of a logarithm
     RowMatrix W = rows_.leftCols(scale_.size()) * scale_.asDiagonal();
     solve_from_right(at.R, W);
     const auto squares_at = [&](const Parameters& noise) {
@@ -195,9 +198,9 @@ class AboutUnknowns {
   Eigen::VectorXd scale_;
 };
 
-/// -2 log likelihood of residuals with the best white factor, without constants:
+/// -2 log likelihood of the residuals for the best white factor, without constants:
 ///     (m - rank) log q + log |V| + g . x,   q = sum of squares of the prewhitened residuals
-/// g: slope of log |A^T V^-1 A|.
+/// m: number of rows, g: derivative of log |A^T V^-1 A| by x.
 class Likelihood {
  public:
   Likelihood(const NoiseSeries& series, const Scales& scales, RowMatrix residual, double freedom)
@@ -247,18 +250,18 @@ struct Bounds {
 struct Scored {
   Parameters x;
   Likelihood::Value value;
-  Eigen::MatrixXd information;  ///< Fisher information of x
+  Eigen::MatrixXd information;  ///< Fisher information of the parameters x
 };
 
-/// Slope of the objective, and Fisher information of x for the best white factor. With the
-/// prewhitened residuals e of variance kappa and the log variances l of the predictions,
+/// Derivative of the objective by x, and Fisher information of x for the best white factor. With
+/// the prewhitened residuals e of variance kappa and the log variances l of the predictions,
 ///     F_jk = sum (dl_j - mean) (dl_k - mean) / 2 + sum de_j de_k / kappa
 struct Slope {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information;
 };
 Slope slope_at(const Likelihood& likelihood, const Parameters& x, const Likelihood::Value& v) {
-  constexpr double kStep = 1e-4;  // of a logarithm
+  constexpr double kStep = 1e-4;  // step of a logarithm
   const Eigen::Index p = x.size(), m = v.innovation.rows();
   Slope s{Eigen::VectorXd::Zero(p), Eigen::MatrixXd::Zero(p, p)};
   Eigen::MatrixXd of_log(m, p), of_residual(m, p);
@@ -281,11 +284,11 @@ Slope slope_at(const Likelihood& likelihood, const Parameters& x, const Likeliho
   return s;
 }
 
-/// Minimum of the objective by Fisher scoring with damping [Levenberg 1944].
+/// Minimises the objective by Fisher scoring with damping [Levenberg 1944].
 Scored minimised(const Likelihood& likelihood, const Bounds& bounds, Parameters x) {
   constexpr int kMostSteps = 30;
-  constexpr double kConverged = 1e-3;  // of -2 log likelihood
-  constexpr double kLongest = 1.5;     // of a logarithm
+  constexpr double kConverged = 1e-3;  // change of -2 log likelihood
+  constexpr double kLongest = 1.5;     // largest step of a logarithm
   Likelihood::Value v = likelihood.at(x);
   Slope s = slope_at(likelihood, x, v);
   double damping = 1e-3;
@@ -328,7 +331,8 @@ Scored minimised(const Likelihood& likelihood, const Bounds& bounds, Parameters 
 
 Bounds bounds_for(const NoiseSeries& series, Eigen::Index variances) {
   constexpr double kLeastVariance = 1e-4, kMostVariance = 1e5;
-  // Shorter: the segments are not correlated. Longer: a drift, which the rigid motion follows.
+  // Limits of the correlation time. With a shorter time the segments are not correlated. A longer
+  // one is a drift, which the rigid unknowns follow.
   constexpr double kShortest = 0.3, kLongest = 0.5;
   Bounds b{Parameters::Constant(variances + 1, natural_logarithm(kLeastVariance)),
            Parameters::Constant(variances + 1, natural_logarithm(kMostVariance))};
@@ -338,7 +342,7 @@ Bounds bounds_for(const NoiseSeries& series, Eigen::Index variances) {
   return b;
 }
 
-/// The best of a few places, from the grouped residuals.
+/// Start values: the best of a few points, with the grouped residuals.
 Parameters start(const Likelihood& likelihood, const Bounds& bounds) {
   constexpr std::array kTimes{0.1, 0.25, 0.45, 0.65, 0.85};
   constexpr std::array kVariances{0.3, 3.0, 30.0};
@@ -369,7 +373,7 @@ TrackerNoise noise_at(const Scales& scales, const Scored& best) {
           .correlation_time = slow.correlation_time};
 }
 
-/// y - A U of the rows in units of their white noise.
+/// Residuals y - A U of the rows, divided by their white noise.
 RowMatrix without(const Observations& o, std::span<const double> residual_m,
                   const Eigen::VectorXd& U) {
   RowMatrix left(std::ssize(residual_m), 1);
@@ -387,12 +391,12 @@ RowMatrix without(const Observations& o, std::span<const double> residual_m,
 
 Result<TrackerNoise> estimate_noise(const Observations& o, std::span<const double> residual_m,
                                     const Options& options) {
-  // Slope of log |A^T V^-1 A| and U are those at the end of the round before: where the rounds no
-  // longer change x, the slope of -2 log of the restricted likelihood is zero. After the second
-  // round the slope hardly changes, and only U is computed again.
+  // Each round uses U and the derivative of log |A^T V^-1 A| from the end of the previous round.
+  // When the rounds no longer change x, the derivative of -2 log of the restricted likelihood is
+  // zero. After the second round this derivative hardly changes, and only U is computed again.
   constexpr int kMostRounds = 4, kRoundsWithSlope = 2;
-  // Square of a third of the standard deviation of x; the next round would change x by less than a
-  // tenth of that.
+  // Limit of the squared change of x, relative to its variance: a third of the standard deviation.
+  // The next round would change x by less than a tenth of this.
   constexpr double kConverged = 0.1;
   const NoiseSeries series = noise_series(o);
   const Scales scales(series);

@@ -13,8 +13,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Sections of a cell between two nodes: waves down to a third of the distance of the nodes differ
-/// from section to section.
+/// Number of sections of a cell between two nodes. Six sections resolve waves whose length is a
+/// third of the distance of the nodes, or more.
 constexpr std::size_t kSectionsOfCell = 6;
 
 struct PlaceInCell {
@@ -37,8 +37,8 @@ std::vector<Table> tables_of(const ParameterLayout& layout, Axis axis) {
   return tables;
 }
 
-/// Sections of one axis. A row is moved by a table as by its values at the nodes together, because
-/// the weights of the nodes add up to one.
+/// Sections of one axis. A table moves a row by the same amount as all its node values together,
+/// because the weights of the nodes add up to one.
 Places places_of_axis(const ParameterLayout& layout, Axis axis) {
   const std::vector<double>& nodes_m = layout.nodes()[index(axis)].nodes_m;
   const std::vector<Table> tables = tables_of(layout, axis);
@@ -68,7 +68,7 @@ Places places_of_axis(const ParameterLayout& layout, Axis axis) {
               }};
 }
 
-/// The cells between the nodes of all axes; components: V in machine axes.
+/// Sections of the volume: the cells between the nodes of all axes. Components: V in machine axes.
 Places places_of_volume(const ParameterLayout& layout) {
   const MachineNodes& nodes = layout.nodes();
   std::array<std::size_t, 3> count{};
@@ -92,7 +92,7 @@ Places places_of_volume(const ParameterLayout& layout) {
                        Eigen::Ref<Eigen::VectorXd> x) { x = o.rows[row].direction; }};
 }
 
-/// Standard uncertainty at each node: that of the cell beside it that has the larger one.
+/// Sets the standard uncertainty at each node: the larger of the values of both adjacent cells.
 void set_at_nodes(Misfit& misfit, const Table& table, const Eigen::VectorXd& variance_of_cell) {
   const Eigen::Index cells = variance_of_cell.size();
   for (Eigen::Index node = 0; node <= cells; ++node) {
@@ -103,7 +103,7 @@ void set_at_nodes(Misfit& misfit, const Table& table, const Eigen::VectorXd& var
   }
 }
 
-/// Mean over the rows of the variances of V that the misfit of the tables causes.
+/// Part of the variance of V that the misfit of the tables causes: mean over the rows.
 Vector3 mean_of_tables_m2(const Misfit& misfit, std::span<const ResidualsOfRun> runs) {
   Vector3 sum_m2 = Vector3::Zero();
   double rows = 0.0;
@@ -132,14 +132,14 @@ Eigen::MatrixXd joined(const std::vector<Eigen::MatrixXd>& parts, Eigen::Index r
   return all;
 }
 
-/// "EYX 1.4 um between 100 and 150 mm"
+/// Text such as "EYX 1.4 um between 100 and 150 mm".
 std::string note_on(const Table& table, const AxisNodes& axis, const Eigen::VectorXd& variances) {
   const double mean = variances.mean();
   Eigen::Index most = 0;
   const double largest = variances.maxCoeff(&most);
   std::string text = message(name(table.motion), " ", kUmPerM * std::sqrt(mean),
                              is_rotation(table.motion.motion) ? " urad rms" : " um rms");
-  constexpr double kOneCell = 4.0;  // of the mean
+  constexpr double kOneCell = 4.0;  // a cell with more than this multiple of the mean is named
   if (largest > kOneCell * mean && variances.size() > 1) {
     const auto cell = static_cast<std::size_t>(most);
     text += message(", most of it between ", kMmPerM * axis.nodes_m[cell], " and ",
@@ -199,7 +199,7 @@ class Finder {
     roots_.push_back(repeated.root_of_covariance(of_cells, Q_));
     double& all_m = found_.misfit.table_length_m;
     all_m = all_m > 0.0 ? std::min(all_m, length_m) : length_m;
-    // A wave falls to one half of its correlation after a sixth of its length.
+    // The correlation of a wave falls to one half after a sixth of its length.
     found_.notes.push_back(message(
         "between the nodes of ", letter(axis), " the machine differs from the model by ", text,
         "; it is in the uncertainty; nodes ", kMmPerM * std::max(length_m, section_m),

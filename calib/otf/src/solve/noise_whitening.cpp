@@ -9,7 +9,8 @@ namespace {
 
 using Matrix = std::array<std::array<double, kNoiseSources>, kNoiseSources>;
 
-/// Covariance of x at the end of a segment and of the mean m over it, of the first n sources.
+/// Joint covariance of the slow noise x at the end of a segment and of its mean m over the segment,
+/// for the first n sources.
 class Covariance {
  public:
   explicit Covariance(std::size_t n) : n_(n) {
@@ -37,10 +38,10 @@ class Covariance {
   }
 
   struct Update {
-    double variance = 1.0;   ///< of the prediction of the row
-    NoiseResponse x{}, m{};  ///< gains
+    double variance = 1.0;   ///< variance of the prediction of the row
+    NoiseResponse x{}, m{};  ///< Kalman gains of x and m
   };
-  /// A row that sees `response` . m and white noise of variance 1.
+  /// Updates with a row that contains `response` . m and white noise of variance 1.
   Update update(const NoiseResponse& response) {
     const NoiseResponse x = product(xm_, response), m = product(mm_, response);
     Update u;
@@ -67,7 +68,7 @@ class Covariance {
     }
     return c;
   }
-  /// Subtracts a b^T.
+  /// Subtracts the matrix a b^T.
   void subtract(Matrix& from, const NoiseResponse& a, const NoiseResponse& b) const {
     for (std::size_t i = 0; i < n_; ++i) {
       for (std::size_t j = 0; j < n_; ++j) {
@@ -80,7 +81,7 @@ class Covariance {
   Matrix xx_{}, xm_{}, mm_{};
 };
 
-/// Steps of durations that repeat, computed once.
+/// Steps of the noise for each duration; durations repeat, so that each step is computed once.
 class Steps {
  public:
   explicit Steps(double correlation_time) : correlation_time_(correlation_time) {}
@@ -131,7 +132,7 @@ NoiseWhitening::NoiseWhitening(const NoiseSeries& series, const SlowNoise& noise
   double variances = 0.0, end = series.segments.front().begin;
 
   for (const NoiseSegment& b : series.segments) {
-    constexpr double kNoGap = 1e-3;  // of a segment: rounding of the times
+    constexpr double kNoGap = 1e-3;  // relative to the segment: rounding of the times
     const double pause = b.begin - end, duration = b.end - b.begin;
     const SlowNoiseStep gap = pause > kNoGap * duration ? through_gap.over(pause) : SlowNoiseStep{};
     const SlowNoiseStep& step = over_segment.over(duration);

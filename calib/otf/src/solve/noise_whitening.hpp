@@ -12,32 +12,33 @@
 
 namespace abbe::calib::otf {
 
-/// Slow noise in units of the white noise of the rows.
+/// Slow noise, divided by the white noise of the rows.
 struct SlowNoise {
   std::array<double, kNoiseSources> variance{};  ///< m^2 or rad^2
   double correlation_time = 1.0;
 };
 
-/// An Ornstein-Uhlenbeck process of variance 1 over a time with the mean m: x_end = keep x_begin +
-/// noise, m = mean x_begin + noise.
+/// Transition of an Ornstein-Uhlenbeck process of variance 1 over a time in which its mean is m:
+/// x_end = keep x_begin + noise, m = mean x_begin + noise.
 struct SlowNoiseStep {
   double keep = 1.0, mean = 1.0;
-  double variance_x = 0.0, covariance = 0.0, variance_m = 0.0;  ///< of the noise
+  double variance_x = 0.0, covariance = 0.0, variance_m = 0.0;  ///< variances and covariance of
+                                                                ///< this noise in x_end and m
   [[nodiscard]] double stationary_variance_m() const { return mean * mean + variance_m; }
 };
 [[nodiscard]] SlowNoiseStep slow_noise_step(double duration, double correlation_time);
 
 class NoiseWhitening {
  public:
-  /// `series` must outlive it.
+  /// Computes the filter. `series` must outlive this object.
   NoiseWhitening(const NoiseSeries& series, const SlowNoise&);
 
-  /// Replaces rows in units of their white noise by (row - prediction) / root of the variance of
-  /// the prediction.
+  /// Replaces rows, which are divided by their white noise, by (row - prediction) / standard
+  /// deviation of the prediction.
   void apply(RowMatrix& rows) const;
-  /// log of this variance by row: their sum is log |V|.
+  /// Logarithm of the variance of the prediction for each row; their sum is log |V|.
   [[nodiscard]] std::span<const double> log_variance() const { return log_variance_; }
-  /// Mean variance of the rows, not predicted.
+  /// Mean variance of the rows without prediction.
   [[nodiscard]] double mean_variance() const { return mean_variance_; }
 
  private:

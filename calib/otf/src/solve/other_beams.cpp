@@ -22,7 +22,7 @@ struct Difference {
 std::vector<Difference> differences(const Observations& o, std::span<const double> residual_m,
                                     const Vector3& tracker_m) {
   std::vector<Difference> all;
-  std::array<std::optional<std::size_t>, 2> before;  // row by component
+  std::array<std::optional<std::size_t>, 2> before;  // previous row of each component
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Observation& row = o.rows[i];
     if (row.component >= before.size()) {
@@ -40,15 +40,15 @@ std::vector<Difference> differences(const Observations& o, std::span<const doubl
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// c^T S c = of(c) . (Sxx, Syy, Szz, Syz, Szx, Sxy)
+/// The row with c^T S c = of(c) . (Sxx, Syy, Szz, Syz, Szx, Sxy).
 Vector6d of(const Vector3& c) {
   Vector6d row;
   row << c.cwiseAbs2(), 2.0 * c.y() * c.z(), 2.0 * c.z() * c.x(), 2.0 * c.x() * c.y();
   return row;
 }
 
-/// S in m^2; nullopt if the components do not determine it. The square of a difference has a
-/// standard deviation of sqrt(2) times its expectation.
+/// Estimates S in m^2; nullopt if the components do not determine it. The square of a difference
+/// has a standard deviation of sqrt(2) times its expectation.
 std::optional<Matrix3> covariance_of(std::span<const Difference> all) {
   constexpr int kRounds = 10;
   constexpr double kLeast = 0.01, kDetermined = 1e-3;  // relative
@@ -84,8 +84,9 @@ std::optional<Matrix3> covariance_of(std::span<const Difference> all) {
 
 std::optional<OtherBeams> find_other_beams(const Observations& o, const Solution& solution) {
   constexpr std::size_t kLeastRows = 200;
-  // Of variances: of the largest two, which are alike, and of the least one to them. The latter has
-  // a relative standard deviation of about 3 / sqrt(rows).
+  // Limits of ratios of the three variances of S. kAlike: of the two largest, which must be equal.
+  // kSmaller: of the smallest to them. The latter ratio has a relative standard deviation of about
+  // 3 / sqrt(rows).
   constexpr double kAlike = 0.5, kSmaller = 0.6, kSure = 5.0;
   constexpr double kStated = 0.5;  // mean square of the cosine to the stated beams
   if (o.mode != Mode::OnTheFly) {

@@ -19,8 +19,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Correlation of the whitened residuals of neighbouring rows in one direction above the 99.9 %
-/// quantile of white noise, for which it has the standard deviation 1/sqrt(pairs).
+/// True if the correlation of the whitened residuals of neighbouring rows in one direction exceeds
+/// the 99.9 % quantile for white noise. For white noise its standard deviation is 1/sqrt(pairs).
 bool is_correlated_in(const Observations& o, std::span<const double> residual_m,
                       std::size_t component) {
   double products = 0.0, squares = 0.0, pairs = 0.0, rows = 0.0;
@@ -55,11 +55,11 @@ RowInformation information_of(const Observations& o, const WhitenedRows& rows) {
   return information;
 }
 
-/// The adjustment of prewhitened rows, with all effects in the covariance.
+/// Result of the adjustment of prewhitened rows, with all effects in the covariance.
 struct Whitened {
   Eigen::VectorXd U;
   Eigen::MatrixXd covariance;
-  std::vector<double> residual_m;  ///< of the observations' own rows
+  std::vector<double> residual_m;  ///< residuals of the original rows
   double variance_factor = 1.0;
   std::optional<OffsetInModel> offset_in_model{};
   Eigen::MatrixXd covariance_of_noise{};

@@ -4,7 +4,8 @@
 
 namespace abbe::calib::otf {
 
-/// `data` with the priors of the observations: backlash, smoothness. Unchanged without both.
+/// Returns `data` with the priors of the observations added: backlash, smoothness. Unchanged
+/// without both.
 [[nodiscard]] inline estimation::Information with_priors(estimation::Information data,
                                                          const Observations& o) {
   data = with_backlash_prior(std::move(data), o);
@@ -14,7 +15,8 @@ namespace abbe::calib::otf {
   return data;
 }
 
-/// trace(Q A^T W^2 A), rounded; `data`: without the priors that Q contains.
+/// Number of combinations that the data determine: trace(Q A^T W^2 A), rounded. `data`: information
+/// without the priors that Q contains.
 [[nodiscard]] std::size_t determined_by(const estimation::Information& data,
                                         const Eigen::MatrixXd& Q);
 

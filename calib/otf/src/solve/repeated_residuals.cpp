@@ -12,7 +12,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Products of independent legs, without what noise alone gives, by pair of legs.
+/// Products of independent legs after subtraction of their expectation for noise alone, stored by
+/// pair of legs.
 class Products {
  public:
   Products(std::size_t components, std::size_t legs)
@@ -25,17 +26,17 @@ class Products {
           products(static_cast<Eigen::Index>(c));
     }
   }
-  /// Sum over its standard deviation if only chance makes it differ from zero. The products of one
-  /// pair may be correlated; those of different pairs are not.
+  /// Sum of the products divided by its standard deviation under the hypothesis that it is zero.
+  /// The products of one pair of legs may be correlated; those of different pairs are not.
   [[nodiscard]] double deviations(std::size_t component) const {
     const double squares = sums_[component].squaredNorm();
     return squares > 0.0 ? sums_[component].sum() / std::sqrt(squares) : 0.0;
   }
-  /// Natural logarithm of the probability of a larger sum by chance, where every leg has one sign
-  /// or the other, for all its sections together. The sum has the standard deviation s of
-  /// deviations() and, with P the symmetric matrix of the products, the third moment tr(P^3): it
-  /// has nearly the distribution of (chi-square - k) s / sqrt(2 k) with k = 8 s^6 / tr(P^3)^2
-  /// degrees of freedom. Few legs that are alike have k = 1, and tails far heavier than a normal
+  /// Natural logarithm of the probability of a larger sum by chance. Hypothesis: every leg has a
+  /// random sign, common to all its sections. The sum has the standard deviation s of deviations()
+  /// and the third moment tr(P^3), P: symmetric matrix of the products. Its distribution is
+  /// approximately that of (chi-square - k) s / sqrt(2 k) with k = 8 s^6 / tr(P^3)^2 degrees of
+  /// freedom. A few legs with equal residuals have k = 1, with much larger tails than a normal
   /// distribution.
   [[nodiscard]] double log_p(std::size_t component) const {
     constexpr double kNotRare = 3.0, kMostDegrees = 1e4;
@@ -68,10 +69,10 @@ double time_of(const Observations& o, const Observation& row) {
                                           : static_cast<double>(row.segment);
 }
 
-/// Consecutive legs within half of the time after which slow noise is independent count as one:
-/// else the products of one leg with each of them would be alike, and chance would seem impossible.
-/// So do some legs of a long path, because the products of all pairs need memory. By leg: its
-/// group.
+/// Index of the group of each leg. Consecutive legs form a group if they are within half of the
+/// time after which slow noise is independent. Otherwise the products of a leg with each of them
+/// would be nearly equal, and their sum would seem significant. On a long path further legs are
+/// combined, because the products of all pairs need memory.
 std::vector<std::size_t> groups_of_legs(const Observations& o, double correlation_time) {
   constexpr std::size_t kMostGroups = 200;
   const std::size_t legs = o.rows.empty() ? 0 : o.rows.back().leg + 1;
@@ -87,7 +88,7 @@ std::vector<std::size_t> groups_of_legs(const Observations& o, double correlatio
   std::optional<std::size_t> first;
   for (std::size_t leg = 0; leg < legs; ++leg) {
     if (!std::isfinite(begin[leg])) {
-      continue;  // without rows
+      continue;  // a leg without rows
     }
     if (!first) {
       first = leg;
@@ -100,7 +101,7 @@ std::vector<std::size_t> groups_of_legs(const Observations& o, double correlatio
   return group_of;
 }
 
-/// x >= 0 with K x = q, as nearly as possible: unknowns that become negative are set to zero.
+/// Solves K x = q approximately with x >= 0: unknowns that become negative are set to zero.
 Eigen::VectorXd not_negative(const Eigen::MatrixXd& K, const Eigen::VectorXd& q) {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index i = 0; i < q.size(); ++i) {
@@ -160,7 +161,7 @@ void RepeatedResiduals::add_run(const Places& places, const ResidualsOfRun& run,
     std::vector<OfLeg>& legs = sections_[at.index];
     if (legs.empty() || legs.back().leg != leg) {
       if (!legs.empty()) {
-        legs.back().column_of = {};  // complete: it takes most of the memory
+        legs.back().column_of = {};  // no longer needed; it takes most of the memory
       }
       legs.push_back({.leg = leg,
                       .b = Eigen::VectorXd::Zero(n),
@@ -223,9 +224,10 @@ bool RepeatedResiduals::are_independent(const OfLeg& a, const OfLeg& b) const {
 }
 
 Eigen::MatrixXd RepeatedResiduals::variances(const Eigen::MatrixXd& of_noise) const {
-  // Probabilities by chance: of a component in all cells, and in one of many cells.
+  // Limits of the probability by chance: of a component in all cells together, and in one of many
+  // cells.
   constexpr double kChanceOfAll = 1e-4, kChanceOfCell = 1e-5;
-  constexpr double kLikely = 2.0;  // standard deviations
+  constexpr double kLikely = 2.0;  // in standard deviations
   const double log_all = natural_logarithm(kChanceOfAll),
                log_cell = natural_logarithm(kChanceOfCell);
   const auto n = static_cast<Eigen::Index>(components_);

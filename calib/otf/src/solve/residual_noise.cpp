@@ -8,8 +8,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// End of the series of neighbouring points that begins with row `begin`: a leg, or all positions
-/// of a run with standstills.
+/// End of the series of neighbouring points that begins with row `begin`. A series is a leg, or all
+/// positions of a run in standstill mode.
 std::size_t series_end(const Observations& o, std::size_t begin) {
   if (o.mode == Mode::Standstill) {
     return o.rows.size();
@@ -63,17 +63,17 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
     begin = end;
   }
 
-  constexpr double kOfSecondDifference = 6.0;  // variances 1 + 4 + 1
+  constexpr double kOfSecondDifference = 6.0;  // variance of a second difference: 1 + 4 + 1
   ResidualNoise noise;
   noise.sigma0 =
       std::sqrt(products[0] / static_cast<double>(std::max<std::size_t>(1, degrees_of_freedom)));
-  constexpr std::size_t kEnough = 30;  // fewer do not separate fast from slow noise
+  constexpr std::size_t kEnough = 30;  // with fewer values, fast and slow noise cannot be separated
   const bool enough = second_differences.size() >= kEnough;
   noise.local = !enough ? noise.sigma0
                         : kMadToSigma * median(second_differences) / std::sqrt(kOfSecondDifference);
 
-  // 99.9 % quantile of the normal distribution. For white noise an autocorrelation coefficient from
-  // n pairs has the standard deviation 1/sqrt(n).
+  // Limit: 99.9 % quantile of the normal distribution. For white noise an autocorrelation
+  // coefficient from n pairs has the standard deviation 1/sqrt(n).
   for (std::size_t lag = 1; lag <= kMostLags && pairs[lag] > 0; ++lag) {
     const auto n = static_cast<double>(pairs[lag]);
     const double coefficient = products[lag] / n / (products[0] / static_cast<double>(pairs[0]));

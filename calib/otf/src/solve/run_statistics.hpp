@@ -1,5 +1,4 @@
 #pragma once
-/// Statistics of the fit of a run.
 
 #include <cstddef>
 
@@ -8,7 +7,8 @@
 
 namespace abbe::calib::otf {
 
-/// `a`: rank, datum defect and condition of the adjustment.
+/// Computes the statistics of the fit of a run. `a` gives rank, datum defect and condition of the
+/// adjustment.
 [[nodiscard]] Statistics statistics(const Observations&, const Adjustment& a, const Residuals&);
 
 /// Factor for the covariance, from the residuals. Turbulence, vibration, a tracker worse than its
@@ -16,7 +16,7 @@ namespace abbe::calib::otf {
 /// increase with them. Residuals smaller than the stated noise do not reduce the uncertainty.
 [[nodiscard]] double variance_factor(const ResidualNoise&, std::size_t degrees_of_freedom);
 
-/// Mean distance of the times of consecutive segments; 1 for segments without times.
+/// Mean time from one segment to the next; 1 for segments without times.
 [[nodiscard]] double segment_distance(const Observations&);
 
 }  // namespace abbe::calib::otf

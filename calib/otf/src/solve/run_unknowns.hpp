@@ -1,6 +1,6 @@
 #pragma once
 /// Unknowns of several runs with the same tables: the parameters of the model, then the rigid and
-/// clock unknowns of each run. All runs have clock unknowns, or none has.
+/// clock unknowns of each run. Either all runs have clock unknowns, or no run has.
 
 #include <cstddef>
 #include <span>
@@ -24,7 +24,7 @@ class RunUnknowns {
   [[nodiscard]] std::size_t size() const { return model_ + per_run_ * runs_; }
   [[nodiscard]] std::size_t rigid_offset(std::size_t run) const { return model_ + per_run_ * run; }
 
-  /// For each unknown of the observations of a run, its place among the unknowns of all runs.
+  /// For each unknown of the observations of a run, its index among the unknowns of all runs.
   [[nodiscard]] std::vector<std::size_t> of_run(std::size_t run) const {
     std::vector<std::size_t> at;
     for (std::size_t i = 0; i < model_ + per_run_; ++i) {
@@ -32,17 +32,17 @@ class RunUnknowns {
     }
     return at;
   }
-  /// The unknowns of the observations of a run.
+  /// The part of a vector that belongs to the unknowns of a run.
   [[nodiscard]] Eigen::VectorXd part(const Eigen::VectorXd& of_all, std::size_t run) const {
     return of_all(of_run(run));
   }
-  /// Rows and columns of the unknowns of a run.
+  /// The block of a matrix that belongs to the unknowns of a run.
   [[nodiscard]] Eigen::MatrixXd block(const Eigen::MatrixXd& of_all, std::size_t run) const {
     const std::vector<std::size_t> at = of_run(run);
     return of_all(at, at);
   }
 
-  /// Name of an unknown for messages: "EXX at -0.300 m", "rx", "rx of run 2".
+  /// Name of an unknown for messages, such as "EXX at -0.300 m", "rx", "rx of run 2".
   [[nodiscard]] std::string label(const Observations& of_any_run, std::size_t unknown) const {
     if (unknown < model_ || runs_ == 1) {
       return of_any_run.label(unknown);

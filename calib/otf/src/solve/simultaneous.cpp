@@ -15,9 +15,10 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Rotation about `rotation_rad`, by its angle up to the third order:
+/// Rotation matrix for a small rotation vector, exact up to the second order:
 ///     I + 2 / (1 + a^2) ([a]_x + [a]_x^2),   a = rotation / 2   (Rodrigues)
-/// It is orthogonal for any a, and sums and products alone give the same bits everywhere.
+/// It is orthogonal for any a. It uses only sums, products and a division, and thus gives the same
+/// bits on every processor.
 Matrix3 small_rotation(const Vector3& rotation_rad) {
   const Vector3 a = 0.5 * rotation_rad;
   const Matrix3 cross = rotation_effect(a).transpose();
@@ -37,7 +38,7 @@ class ErrorsOnLeg {
   /// Nominal axis position at which the machine was when the target was measured at `p_m` (target
   /// offset subtracted).
   [[nodiscard]] Vector3 nominal_m(const Vector3& p_m) const {
-    constexpr int kRepeats = 2;  // each reduces the error by the slope of V, 1e-3
+    constexpr int kRepeats = 2;  // each repetition reduces the error by the slope of V, 1e-3
     Vector3 c = closest_on_leg(from_m_, to_m_, p_m).closest_m;
     for (int i = 0; i < kRepeats; ++i) {
       c = closest_on_leg(from_m_, to_m_, p_m - V_m(c)).closest_m;
@@ -45,7 +46,7 @@ class ErrorsOnLeg {
     return c;
   }
 
-  /// Direction of travel of the target at c: that of the leg, and the slope of V.
+  /// Direction of travel of the target at c: direction of the leg plus the slope of V.
   [[nodiscard]] Vector3 travel(const Vector3& c_m) const {
     constexpr double kStep_m = 1e-3;  // short compared with the distance of the nodes
     const Vector3 d = (to_m_ - from_m_).normalized();

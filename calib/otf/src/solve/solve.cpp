@@ -174,7 +174,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
     figures = statistics(o, *a, residuals);
   }
 
-  // Of the noise that the residuals have, also where it is smaller than stated.
+  // `fit` describes the actual noise of the residuals, also if it is smaller than the stated noise.
   FitOfRows fit{a->U, residuals.after_m, figures.chi2_per_dof * figures.correlation * a->covariance,
                 figures.correlation * segment_distance(o), two_axes};
   a->covariance *= figures.variance_factor;

@@ -37,8 +37,7 @@ Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
 
 namespace {
 
-/// The range offset, which is an unknown if it has a prior, and the errors of two axes as added
-/// columns.
+/// The range offset (if it has a prior) and the errors of two axes, as added columns.
 class RunEffects {
  public:
   RunEffects(const Observations& o, const WhitenedRows& rows, std::span<const double> residual_m)
@@ -55,7 +54,8 @@ class RunEffects {
     }
   }
 
-  /// s of two_axis_errors.hpp; 0: without errors of two axes.
+  /// Estimates both for the size s of the errors of two axes (two_axis_errors.hpp). s = 0: without
+  /// these errors.
   [[nodiscard]] AddedColumns::Estimate estimate(const Eigen::MatrixXd& Q, double s_m,
                                                 double factor) const {
     if (s_m > 0.0) {
@@ -91,13 +91,15 @@ class RunEffects {
   AddedColumns sums_;
 };
 
-/// The size of the errors of two axes with the largest likelihood. 0 if chance explains them, or an
-/// offset of the ranges that is larger than stated: both bend the volume alike, and such an offset
-/// is a fault to be named (lack_of_fit.hpp).
+/// The size of the errors of two axes with the largest likelihood. It is 0 if the errors are not
+/// significant. It is also 0 if a range offset larger than stated explains the residuals: both
+/// effects bend the volume in a similar way, and such an offset is a fault that must be reported
+/// (lack_of_fit.hpp).
 double likely_two_axis_errors_m(const RunEffects& effects, const Eigen::MatrixXd& Q,
                                 double factor) {
   constexpr std::array kSizes_m{0.25e-6, 0.5e-6, 1e-6, 2e-6, 4e-6, 8e-6, 16e-6, 32e-6};
-  constexpr double kBeyondChance = 25.0;  // of 2 ln L: probability below 1e-5 by chance
+  constexpr double kBeyondChance = 25.0;  // of 2 ln L; reached by chance with a probability below
+                                          // 1e-5
   constexpr double kLargeOffset_m = 1e-3;
   const double without =
       std::max(effects.estimate(Q, 0.0, factor).twice_log_likelihood,
@@ -144,7 +146,8 @@ WithRunEffects with_run_effects(const Observations& o, const WhitenedRows& rows,
   if (effects.has_offset()) {
     with.offset = {e.d(0), e.u(0)};
     left = without_range_offset(std::move(left), with.offset.value_m);
-    // Covariance of U and the offset, over the variance of the offset: with the other effects free.
+    // Covariance of U and the offset, divided by the variance of the offset; the other effects are
+    // free.
     const Eigen::VectorXd dU_dd =
         e.root_cov_dU * e.root_cov_d.row(0).transpose() / (e.u(0) * e.u(0));
     with.in_model =

@@ -14,7 +14,7 @@ SlowNoise in_units_of_white(const TrackerNoise& noise) {
       .correlation_time = noise.correlation_time};
 }
 
-/// Means over the rows, by component.
+/// Correlation of a row with the previous row: mean over the rows, by component.
 std::array<double, 3> correlations(const Observations& o, const NoiseSeries& series,
                                    const SlowNoise& noise) {
   const SlowNoiseStep step = slow_noise_step(series.segment_duration(), noise.correlation_time);
@@ -72,8 +72,8 @@ WhitenedRows::WhitenedRows(const Observations& o, const TrackerNoise& noise)
   }
   apply(A);
 
-  // The prediction from earlier rows decreases with their age, and so do the entries of their
-  // nodes.
+  // Entries below this fraction are left out: the prediction from earlier rows decreases with their
+  // age, and so do the entries of their nodes.
   constexpr double kNegligible = 1e-10;
   std::vector<SparseRows::Entry> row;
   for (Eigen::Index i = 0; i < A.rows(); ++i) {

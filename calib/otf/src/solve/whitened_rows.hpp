@@ -1,5 +1,6 @@
 #pragma once
-/// Rows from which the noise that the earlier rows predict is subtracted (prewhitening.hpp).
+/// The rows of a run after subtraction of the noise that is predicted from earlier rows
+/// (prewhitening.hpp).
 
 #include <optional>
 #include <span>
@@ -11,11 +12,11 @@
 
 namespace abbe::calib::otf {
 
-/// Prewhitened rows have the sigma of the rows of which they are made, if the noise has its mean
-/// variance. `o` must outlive it.
+/// Prewhitened rows, or the original rows. Prewhitened rows have the sigma of the original rows if
+/// their noise has the mean variance. `o` must outlive this object.
 class WhitenedRows {
  public:
-  /// The rows as they are.
+  /// Uses the original rows.
   explicit WhitenedRows(const Observations& o) : o_(o) {}
   WhitenedRows(const Observations& o, const TrackerNoise& noise);
   WhitenedRows(const WhitenedRows&) = delete;
@@ -24,14 +25,14 @@ class WhitenedRows {
   [[nodiscard]] std::span<const SparseRows::Entry> row(std::size_t i) const {
     return whitening_ ? A_.row(i) : o_.A.row(i);
   }
-  /// False if the rows are as they are.
+  /// False if the rows are the original ones.
   [[nodiscard]] bool are_sums() const { return whitening_.has_value(); }
-  /// Replaces other columns of the rows by those of the prewhitened rows.
+  /// Applies the prewhitening to other columns of the rows.
   void apply(RowMatrix& columns) const;
   [[nodiscard]] std::vector<double> values(std::span<const double> of_rows) const;
-  /// Mean variance of the noise of the rows in units of the stated one.
+  /// Mean variance of the noise of the rows relative to the stated variance.
   [[nodiscard]] double variance_factor() const { return variance_factor_; }
-  /// Mean correlation with the row before in the same direction and on the same leg.
+  /// Mean correlation with the previous row in the same direction and on the same leg.
   [[nodiscard]] double lag_1(std::size_t component) const { return lag_1_[component]; }
 
  private:
@@ -43,8 +44,8 @@ class WhitenedRows {
   std::array<double, 3> lag_1_{};
 };
 
-/// The row of the same component in the segment directly before that of row i, if this segment is
-/// used and on the same leg.
+/// The row of the same component in the previous segment, if this segment is used and on the same
+/// leg.
 [[nodiscard]] std::optional<std::size_t> row_before(const Observations&, std::size_t i);
 
 }  // namespace abbe::calib::otf

@@ -33,7 +33,7 @@ std::vector<DriftPoint> drift_points(const Observations& o, const DriftBasis& ba
   return points;
 }
 
-/// y - A U - C d of every row.
+/// Residuals y - A U - C d of all rows.
 std::vector<double> residuals_with_drift_m(const Observations& o, const DriftColumns& columns,
                                            const Eigen::VectorXd& U, const Eigen::VectorXd& d) {
   std::vector<double> r = residuals_m(o, U);
@@ -43,8 +43,8 @@ std::vector<double> residuals_with_drift_m(const Observations& o, const DriftCol
   return r;
 }
 
-/// What the course of the drift between its knots adds to the covariance of U. It is not estimated:
-/// its coefficients b have the standard deviation of the walk, and change U by
+/// Additional covariance of U because the drift is not straight between its knots. This deviation
+/// is not estimated: its coefficients b have the standard deviation of the walk, and change U by
 ///     dU/db = Q A^T W^2 B - (Q A^T W^2 C) cov(d) (C^T W^2 (1 - A Q A^T W^2) B) / factor
 Eigen::MatrixXd covariance_between_knots(const Observations& o, const WhitenedRows& rows,
                                          const Eigen::MatrixXd& cofactor_Q,
@@ -142,7 +142,7 @@ Result<WithDrift> with_drift(const Observations& o, const WhitenedRows& rows, co
     added += covariance_between_knots(o, rows, a.cofactor_Q, residual_m, estimate, factor_used,
                                       static_cast<std::size_t>(offsets));
   }
-  with.added_covariance = 0.5 * (added + added.transpose());  // symmetric in spite of rounding
+  with.added_covariance = 0.5 * (added + added.transpose());  // removes the asymmetry by rounding
   return with;
 }
 

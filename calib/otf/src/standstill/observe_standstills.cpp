@@ -49,14 +49,14 @@ double variance_of_mean(const Standstill& s, Eigen::Index k, double sigma2, doub
     sigma2 = scatter2;
   }
 
-  // The slope of n independent samples has the standard deviation sigma sqrt(12 / n) per length.
+  // Standard deviation of the creep from n independent samples: sigma sqrt(12 / n).
   const double variance = sigma2 * correlation / n, creep2 = s.creep_m(k) * s.creep_m(k);
   constexpr double kUniform = 12.0;  // variance of a uniform distribution of unit width: 1/12
   const bool significant = creep2 > kNormal999 * kNormal999 * kUniform * variance;
   return variance + (significant ? creep2 / kUniform : 0.0);
 }
 
-/// Alignment of the assigned standstills: leg and segment are position and standstill.
+/// Alignment for the assigned standstills: "leg" and "segment" are position and standstill.
 Alignment alignment_of(const StandstillAssignment& a, const Standstills& all, const Path& path) {
   Alignment alignment{.T_machine_tracker = a.T_machine_tracker,
                       .rough_T_machine_tracker = a.rough_T_machine_tracker};
@@ -99,7 +99,7 @@ void note_noise(std::vector<std::string>& notes, const Standstills& all, const N
   }
 }
 
-/// The three rows of a position.
+/// Appends the three rows of a position.
 void append_position(Observations& o, std::size_t position, std::size_t standstill,
                      const Standstill& s, const Vector3& u_m) {
   const Vector3& nominal = o.vertices_m[position];

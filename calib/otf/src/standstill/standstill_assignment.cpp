@@ -16,20 +16,21 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Points of a first correspondence, and how far its distances may differ from the nominal ones:
-/// each point has an error up to Options::max_alignment_rms_m.
+/// Number of points of a first correspondence, and tolerance of the distances between them: each
+/// point may have an error up to Options::max_alignment_rms_m.
 constexpr std::size_t kSeedPoints = 6;
 constexpr double kSeedTolerance_m = 3e-3;
-/// Tolerance of the assignment with the pose of a first correspondence: its rotation is uncertain.
+/// Tolerance of the assignment with the pose from a first correspondence, whose rotation is
+/// uncertain.
 constexpr double kRoughTolerance_m = 10e-3;
 
-/// A pose and its assignment.
+/// A pose of the tracker with its assignment.
 struct Hypothesis {
   RigidTransform T_machine_tracker;
   OrderedMatch match;
 };
 
-/// The data of one assignment.
+/// Input data of one assignment.
 struct Problem {
   std::span<const Standstill> standstills;
   const Vector3& target_offset_m;
@@ -65,7 +66,7 @@ Problem problem_of(std::span<const Standstill> standstills, const Machine& machi
   return p;
 }
 
-/// The distances between successive points, and between every second one, agree.
+/// True if the distances between successive points agree, and those between every second point.
 bool same_distances(std::span<const Vector3> a, std::span<const Vector3> b) {
   for (std::size_t i = 1; i < a.size(); ++i) {
     for (std::size_t back = 1; back <= std::min<std::size_t>(2, i); ++back) {
@@ -100,8 +101,9 @@ std::optional<RigidTransform> pose_of(std::span<const Vector3> measured_m,
   return *T;
 }
 
-/// The best hypothesis from first correspondences in which the standstill has up to `most_shift`
-/// positions more or less before it than the position. A few are tried for each shift.
+/// The best hypothesis from first correspondences. In a correspondence the index of the standstill
+/// may differ from that of the position by up to `most_shift`. A few correspondences are tried for
+/// each shift.
 Result<std::optional<Hypothesis>> first_hypothesis(const Problem& p, const Options& options) {
   constexpr std::size_t kTries = 3;
   constexpr std::ptrdiff_t kFewestShifts = 3;
@@ -143,7 +145,7 @@ Result<std::optional<Hypothesis>> first_hypothesis(const Problem& p, const Optio
   return best;
 }
 
-/// Best fit of the assigned standstills to their positions.
+/// Best-fit pose of the assigned standstills on their positions.
 Result<RigidTransform> fit_assigned(const Problem& p, const OrderedMatch& match) {
   std::vector<Vector3> from, to;
   for (std::size_t j = 0; j < p.nominal_m.size(); ++j) {
@@ -173,7 +175,7 @@ Result<int> refine(Hypothesis& h, const Problem& p, double tolerance_m) {
   }
 }
 
-/// "213.4 to 214.4 s".
+/// Text such as "213.4 to 214.4 s".
 std::string when(const Standstill& s) {
   return message(s.begin_s, " to ", s.end_s, " s");
 }
@@ -239,7 +241,8 @@ std::string first_difference(const Problem& p, const Path& path) {
   return "the distances between successive points agree, the shape of the path does not";
 }
 
-/// Text of the first position without standstill, and where the machine stood instead.
+/// Text about the first position without a standstill, and the place where the machine stood
+/// instead.
 std::string first_missed(const StandstillAssignment& a, const Problem& p, const Path& path) {
   const std::size_t j = a.missed.front();
   std::string text = message("the first is ", position_text(j, path));
@@ -258,7 +261,7 @@ std::string first_missed(const StandstillAssignment& a, const Problem& p, const 
   return text;
 }
 
-/// AlignmentFailed if too many points are left over or too far apart.
+/// AlignmentFailed if too many points are unassigned, or too far apart.
 Result<void> check_assignment(const StandstillAssignment& a, const Problem& p, const Path& path,
                               const Options& options) {
   const double most = options.standstill.most_unmatched;
@@ -316,7 +319,8 @@ Result<StandstillAssignment> assign_as_given(std::span<const Standstill> standst
   return a;
 }
 
-/// BadInput for so many points that the assignment would take more than a second.
+/// TooFewObservations for too few standstills; BadInput for so many points that the assignment
+/// would take more than a second.
 Result<void> check_size(std::size_t standstills, std::size_t positions) {
   constexpr std::size_t kFewest = 4, kMost = 3000;
   if (standstills < kFewest) {
@@ -330,7 +334,8 @@ Result<void> check_size(std::size_t standstills, std::size_t positions) {
   return {};
 }
 
-/// True if the standstills with other points of the tracker match the positions.
+/// True if the standstills match the positions after all points of the tracker are replaced by
+/// `corrected(point)`.
 template <class Corrected>
 bool fits_with_points(std::span<const Standstill> standstills, const Corrected& corrected,
                       const Machine& machine, const Path& path, const Options& options) {
@@ -344,8 +349,9 @@ bool fits_with_points(std::span<const Standstill> standstills, const Corrected& 
   return assign_as_given(changed, machine, path, options).has_value();
 }
 
-/// "; they fit with ranges shorter by 19.05 mm (...)" if the radius of a usual reflector, added to
-/// or subtracted from all ranges, makes the standstills match the positions; else empty.
+/// Text such as "; they fit with ranges shorter by 19.05 mm (...)" if the radius of a usual
+/// reflector, added to or subtracted from all ranges, makes the standstills match the positions;
+/// else empty.
 std::string reflector_that_fits(std::span<const Standstill> standstills, const Machine& machine,
                                 const Path& path, const Options& options) {
   for (const double radius_m : reflector_radii_m()) {

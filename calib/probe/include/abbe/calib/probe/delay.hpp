@@ -18,7 +18,7 @@
 namespace abbe::calib::probe {
 
 struct FeedTouch {
-  double speed_m_s = 0.0;  ///< of the approach, > 0
+  double speed_m_s = 0.0;  ///< approach feed, > 0
   /// uncompensated position along the direction of the approach, from any common origin
   double along_m = 0.0;
 };
@@ -51,8 +51,8 @@ struct ProbeDelayFit {
   std::size_t touches = 0;
 };
 
-/// NotFinite; BadInput for a speed that is not positive; TooFewObservations below three feeds with
-/// three touches each; DegenerateGeometry if the feeds differ too little.
+/// Estimates the delay. NotFinite; BadInput for a speed that is not positive; TooFewObservations
+/// below three feeds with three touches each; DegenerateGeometry if the feeds differ too little.
 [[nodiscard]] Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches,
                                               const DelayOptions& options = {});
 

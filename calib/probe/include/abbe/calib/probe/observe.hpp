@@ -1,6 +1,6 @@
 #pragma once
-/// Observations from recorded touches: touches of one place from one direction (for the delay), and
-/// touches around a sphere (for the qualification). Pure; allocates. SI units.
+/// Selects observations from recorded touches: touches of one place from one direction (for the
+/// delay), and touches around a sphere (for the qualification). Pure; allocates. SI units.
 
 #include <span>
 #include <vector>
@@ -12,8 +12,8 @@
 namespace abbe::calib::probe {
 
 struct RecordedTouch {
-  Vector3 p_m = Vector3::Zero();           ///< scales at contact
-  Vector3 velocity_m_s = Vector3::Zero();  ///< of the approach
+  Vector3 p_m = Vector3::Zero();           ///< scale readings at contact
+  Vector3 velocity_m_s = Vector3::Zero();  ///< velocity of the approach
 };
 
 struct SamePlaceOptions {
@@ -26,7 +26,8 @@ struct SamePlaceOptions {
 [[nodiscard]] std::vector<FeedTouch> same_place(std::span<const RecordedTouch> touches,
                                                 const SamePlaceOptions& options = {});
 
-/// Each touch with the normal opposite to its approach. Touches with zero velocity are not used.
+/// Returns each touch with the normal opposite to its approach. Touches with zero velocity are not
+/// used.
 [[nodiscard]] std::vector<QualifyingTouch> around_sphere(std::span<const RecordedTouch> touches);
 
 }  // namespace abbe::calib::probe

@@ -23,7 +23,7 @@ struct QualifyingTouch {
 };
 
 struct QualificationOptions {
-  double sphere_radius_m = 12.5e-3;  ///< certified
+  double sphere_radius_m = 12.5e-3;  ///< certified radius
   double u_sphere_radius_m = 0.0;
   /// Limit for the condition number of the Jacobian with columns of unit length. Above this limit
   /// the touches cover too little of the sphere to distinguish lobing from the centre. Condition
@@ -72,8 +72,8 @@ struct Qualification {
   int freedom = 0;
 };
 
-/// NotFinite; BadInput for a normal of zero length; TooFewObservations below 24 touches;
-/// DegenerateGeometry if the touches cover too little of the sphere; NotConverged.
+/// Qualifies the probe. NotFinite; BadInput for a normal of zero length; TooFewObservations below
+/// 24 touches; DegenerateGeometry if the touches cover too little of the sphere; NotConverged.
 [[nodiscard]] Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
                                             const QualificationOptions& options = {});
 

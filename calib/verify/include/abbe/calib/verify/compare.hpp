@@ -1,5 +1,5 @@
 #pragma once
-/// Stage two of a verification: the part of the measured error V_las that a model does not
+/// Stage two of a verification: computes the part of the measured error V_las that a model does not
 /// compensate. [Li OMM] eqs. (20), (21):
 ///     V_residual = V_las - V_comp,   R_resmag = |V_residual| / |V_las|
 /// V_comp: V of the model. R_resmag < 1: the model reduces the error. V_las and V_comp are
@@ -9,7 +9,7 @@
 /// The comparison is made twice: with the model as stated, and with the model after the small rigid
 /// motion that fits it best to V_las. The rigid motion is necessary if the frame of the instrument
 /// was fitted to the readings, which removes the rotation from V_las, and if the rotation of a
-/// ball-array model is unknown. For any VolumetricModel. Lengths in m. Pure; allocates.
+/// ball-array model is unknown. Works for any VolumetricModel. Lengths in m. Pure; allocates.
 
 #include <cstddef>
 #include <optional>
@@ -68,7 +68,8 @@ struct Comparison {
   /// see ratios_hold().
   double interpolation_rms_m = 0.0;
   std::vector<GridPoint> grid;
-  Vector6 turned = Vector6::Zero();  ///< rigid motion: shift [m] (0 with an origin), rotation [rad]
+  Vector6 turned = Vector6::Zero();  ///< rigid motion of the model: shift [m] (0 with an origin),
+                                     ///< rotation [rad]
   RatioStatistics R_stated, R_turned;
 };
 
@@ -90,17 +91,17 @@ inline constexpr double kMostInterpolation = 1.0 / 3.0;
 /// compensation, or less than 1 nm.
 [[nodiscard]] bool ratios_hold(const Comparison&) noexcept;
 
-/// The comparison at the measured places alone: inside, residuals, before, after. Predicts
-/// reference points ([Sanders 2023] section 2.2). NotApplicable: the model is not valid for the
-/// tool. TooFewObservations: fewer than 4 measured places inside the validity volume.
+/// Compares at the measured places alone: inside, residuals, before, after. This corresponds to the
+/// prediction of reference points in [Sanders 2023] section 2.2. NotApplicable: the model is not
+/// valid for the tool. TooFewObservations: fewer than 4 measured places inside the validity volume.
 [[nodiscard]] Result<Comparison> compare_at_points(const Observations&, const VolumetricModel&,
                                                    const Vector3& tool_offset_m);
 
-/// NotApplicable: the model is not valid for the tool. TooFewObservations: fewer than 4 measured
-/// places inside the validity volume, or fewer than 4 grid points inside both the validity volume
-/// and the hull of the measured points. DegenerateGeometry: the origin is outside the hull of the
-/// measured points, so that V at the origin is not known. BadInput: the step gives more than a
-/// million grid points.
+/// Compares at the measured places and on the grid. NotApplicable: the model is not valid for the
+/// tool. TooFewObservations: fewer than 4 measured places inside the validity volume, or fewer than
+/// 4 grid points inside both the validity volume and the hull of the measured points.
+/// DegenerateGeometry: the origin is outside the hull of the measured points, so that V at the
+/// origin is not known. BadInput: the step gives more than a million grid points.
 [[nodiscard]] Result<Comparison> compare(const Observations&, const VolumetricModel&,
                                          const Vector3& tool_offset_m, const Options& = {});
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Solutions of penalised least squares along decreasing lambda by cyclic coordinate descent with
-/// warm starts, strong and active sets ([Breheny 2011], [Tibshirani 2012]), with the semantics of
-/// the R package ncvreg 3.16, so that solutions and iteration counts can be compared:
+/// Computes solutions of penalised least squares along decreasing lambda by cyclic coordinate
+/// descent with warm starts, strong and active sets ([Breheny 2011], [Tibshirani 2012]), with the
+/// semantics of the R package ncvreg 3.16, so that solutions and iteration counts can be compared:
 ///   - Columns are standardised (standardise.hpp), y is centred, the intercept is always fitted and
 ///     never penalised.
 ///   - One iteration is one sweep over the active columns in the order of the columns. A lambda is
@@ -28,15 +28,14 @@
 namespace abbe::calib::sparse {
 
 struct PathOptions {
-  /// Not increasing, none negative. Empty: 100 values equally spaced in the logarithm, from
-  /// lambda_max down to 0.001 lambda_max for n > p (n rows, p columns), else 0.05 lambda_max.
-  /// lambda_max = max_j |x_j' y| / n is the smallest lambda for which all coefficients are zero
-  /// (x_j: standardised columns); it costs no sweep.
+  /// Values of lambda in decreasing order (equal values are permitted), none negative. Empty: 100
+  /// values equally spaced in the logarithm, from lambda_max down to 0.001 lambda_max for n > p (n
+  /// rows, p columns), else 0.05 lambda_max. lambda_max = max_j |x_j' y| / n is the smallest lambda
+  /// for which all coefficients are zero (x_j: standardised columns); it costs no sweep.
   std::vector<double> lambda{};
   double tolerance = 1e-4;  ///< relative to rms(y - mean); 1e-4 as in ncvreg
-  long max_sweeps = 10000;  ///< of the whole path; 10000 as in ncvreg
-  /// The first lambda with more nonzero coefficients than this is the last one of the path;
-  /// nullopt: no limit.
+  long max_sweeps = 10000;  ///< budget of sweeps of the whole path; 10000 as in ncvreg
+  /// Limit of nonzero coefficients: the path ends at the first lambda with more; nullopt: no limit.
   std::optional<Eigen::Index> max_nonzero{};
 };
 
@@ -44,8 +43,8 @@ struct PathOptions {
 /// values of lambda have a column.
 struct Path {
   Penalty penalty;
-  std::vector<double> lambda;  ///< all that were requested
-  std::vector<long> sweeps;    ///< of each reached lambda
+  std::vector<double> lambda;  ///< all requested values
+  std::vector<long> sweeps;    ///< number of sweeps for each reached lambda
   /// p x reached, coefficients of standardised columns, in units of y; 0 for dropped columns.
   Eigen::MatrixXd standardised;
   Eigen::MatrixXd coefficients;          ///< (1 + p) x reached, original units, intercept first
@@ -56,9 +55,9 @@ struct Path {
   [[nodiscard]] Eigen::Index reached() const { return coefficients.cols(); }
 };
 
-/// BadInput: shapes differ, lambda increasing or negative, gamma, tolerance or budget out of range,
-/// no column varies. NotFinite: NaN or infinity. TooFewObservations: fewer than two rows, or y does
-/// not vary.
+/// Computes a path. BadInput: shapes differ, lambda increasing or negative, gamma, tolerance or
+/// budget out of range, no column varies. NotFinite: NaN or infinity. TooFewObservations: fewer
+/// than two rows, or y does not vary.
 [[nodiscard]] Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                     const Penalty&, const PathOptions& = {});
 

@@ -24,8 +24,8 @@ enum class PenaltyKind { Lasso, Mcp, Scad };
   return "?";
 }
 
-/// The larger gamma, the larger the coefficients that are still penalised. gamma > 2 for SCAD, > 1
-/// for MCP, not used by the lasso.
+/// A penalty with its parameter gamma: the larger gamma, the larger the coefficients that are still
+/// penalised. gamma > 2 for SCAD, > 1 for MCP, not used by the lasso.
 struct Penalty {
   PenaltyKind kind = PenaltyKind::Scad;
   double gamma = 3.7;  ///< 3.7: the value [Fan 2001] recommends for SCAD; 3 is customary for MCP

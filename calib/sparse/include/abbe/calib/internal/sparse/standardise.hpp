@@ -1,6 +1,6 @@
 #pragma once
-/// Columns scaled to mean 0 and mean square 1 (divided by n, not n - 1), and the conversion of
-/// coefficients to the original columns.
+/// Scales columns to mean 0 and mean square 1 (divided by n, not n - 1), and converts coefficients
+/// to the original columns.
 
 #include <Eigen/Core>
 #include <vector>
@@ -16,12 +16,13 @@ inline constexpr double kConstantColumn = 1e-6;
 struct Standardised {
   Eigen::MatrixXd X;               ///< n x kept columns
   std::vector<Eigen::Index> kept;  ///< index in the original design, increasing
-  Eigen::VectorXd mean;            ///< of the kept columns
-  Eigen::VectorXd scale;           ///< root mean square about the mean, of the kept columns
+  Eigen::VectorXd mean;            ///< mean of each kept column
+  Eigen::VectorXd scale;           ///< root mean square about the mean of each kept column
   Eigen::Index original_columns = 0;
 };
 
-/// BadInput: no rows, or no column varies. NotFinite: NaN, infinity, or squares that overflow.
+/// Standardises the columns of X. BadInput: no rows, or no column varies. NotFinite: NaN, infinity,
+/// or squares that overflow.
 [[nodiscard]] Result<Standardised> standardise(const Eigen::MatrixXd& X);
 
 /// Coefficients in the units of the original design: row 0 the intercept, row 1 + j column j; one

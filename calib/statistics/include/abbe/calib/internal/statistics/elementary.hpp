@@ -16,16 +16,16 @@ struct SinCos {
   double cos = 1.0;
 };
 
-/// For |angle_rad| <= 1e6; NaN for larger angles and for NaN.
+/// Sine and cosine for |angle_rad| <= 1e6; NaN for larger angles and for NaN.
 [[nodiscard]] SinCos sin_cos(double angle_rad) noexcept;
 
-/// e^x; 0 below -708, infinite above 709.
+/// The exponential function e^x; 0 below -708, infinite above 709.
 [[nodiscard]] double exponential(double x) noexcept;
 
-/// For positive normal numbers; NaN for all others.
+/// Natural logarithm of positive normal numbers; NaN for all others.
 [[nodiscard]] double natural_logarithm(double x) noexcept;
 
-/// x^n by repeated multiplication.
+/// The power x^n by repeated multiplication.
 [[nodiscard]] double power(double x, int n) noexcept;
 
 /// Independent standard normal deviates ([Box 1958]). A seed gives the same sequence on every
@@ -36,10 +36,10 @@ class NormalDeviates {
   [[nodiscard]] double next();
 
  private:
-  /// Uniformly distributed in (0, 1).
+  /// Random number, uniformly distributed in (0, 1).
   double uniform() { return (static_cast<double>(random_() >> 11) + 0.5) * 0x1p-53; }
 
-  std::mt19937_64 random_;  // the C++ standard defines its sequence
+  std::mt19937_64 random_;  // a standard generator: its sequence is defined by the C++ standard
   double second_ = 0.0;
   bool has_second_ = false;
 };

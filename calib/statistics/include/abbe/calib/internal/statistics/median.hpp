@@ -1,5 +1,4 @@
 #pragma once
-/// Median, and the standard deviation that follows from a median of absolute deviations.
 
 #include <algorithm>
 #include <iterator>
@@ -7,11 +6,11 @@
 
 namespace abbe::calib {
 
-/// Standard deviation of a normal distribution, divided by its median absolute deviation.
+/// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
 inline constexpr double kMadToSigma = 1.4826;
 
-/// Middle value, of an even number the larger of the two in the middle; 0 without values. The order
-/// of `values` changes.
+/// Median; for an even number of values the larger of the two middle values; 0 without values. The
+/// order of `values` changes.
 [[nodiscard]] inline double median(std::span<double> values) {
   if (values.empty()) {
     return 0.0;

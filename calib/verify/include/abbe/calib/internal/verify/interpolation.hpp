@@ -1,7 +1,8 @@
 #pragma once
-/// Interpolation of values at scattered points p_i: linear within the tetrahedra of the Delaunay
-/// triangulation of the points; no value outside their convex hull. The interpolation weights w_i
-/// at a place x, nonzero only at the corners of the tetrahedron that contains x, solve
+/// Interpolates values at scattered points p_i. The interpolation is linear within the tetrahedra
+/// of the Delaunay triangulation of the points; no value outside their convex hull. The
+/// interpolation weights w_i at a place x, nonzero only at the corners of the tetrahedron that
+/// contains x, solve
 ///     minimise sum w_i |p_i|^2   subject to   sum w_i p_i = x,  sum w_i = 1,  w_i >= 0
 /// because the triangulation is the lower hull of the points lifted onto a paraboloid. This is a
 /// linear programme with four constraints; no mesh is built. Coordinates are first scaled to the
@@ -24,8 +25,8 @@ struct LinearWeights {
   std::array<double, 4> weight{};
 };
 
-/// One result per place, in the same order; nullopt for a place outside the hull.
-/// DegenerateGeometry unless the points span a volume.
+/// Computes the weights: one result per place, in the same order; nullopt for a place outside the
+/// hull. DegenerateGeometry unless the points span a volume.
 [[nodiscard]] Result<std::vector<std::optional<LinearWeights>>> linear_weights(
     std::span<const Vector3> points, std::span<const Vector3> places);
 

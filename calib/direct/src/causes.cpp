@@ -149,7 +149,8 @@ class CauseSearch {
   /// Factors below kLeastShare are not tried: a factor that moves all positions to nearly one place
   /// would hide every difference.
   void add_units_of_positions(std::vector<CorrectedValues>& all) const {
-    constexpr double kLeastShare = 0.1;  // of the length of the table
+    constexpr double kLeastShare = 0.1;  // smallest length after the correction / length of the
+                                         // table
     const std::vector<double>& nodes_m = curve_.nodes().nodes_m;
     const auto [first, last] = std::ranges::minmax(given_.positions_m);
     const double least_factor = kLeastShare * (nodes_m.back() - nodes_m.front()) / (last - first);

@@ -92,7 +92,7 @@ std::string advice_on_directions(const std::map<int, RunValues>& runs) {
       " both 1, the next two both 2, and so on (1, 1, 2, 2, ...)");
 }
 
-/// For forward and backward: whether the runs have this direction. BadInput unless all runs have
+/// For forward and backward: true if the runs have this direction. BadInput unless all runs have
 /// the same directions.
 Result<std::array<bool, 2>> directions_of(const std::string& name,
                                           const std::map<int, RunValues>& runs) {
@@ -173,8 +173,8 @@ PositionScatter position_scatter_of(const std::vector<std::vector<double>>& pass
 /// Message that explains why no position occurs in all runs: the positions are readings instead of
 /// targets.
 std::string scatter_text(const std::map<int, RunValues>& runs, const std::vector<double>& targets) {
-  constexpr double kReadings = 0.25;  // of the spacing: up to here each reading belongs clearly to
-                                      // one target
+  constexpr double kReadings = 0.25;  // of the spacing; up to this scatter each reading clearly
+                                      // belongs to one target
   const PositionScatter scatter = position_scatter_of(positions_by_pass(runs, targets));
   const std::string limit = message("; positions that differ by more than ",
                                     kMmPerM * kSameTarget_m, " mm are different targets");

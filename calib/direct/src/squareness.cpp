@@ -38,7 +38,7 @@ std::span<const double> positions_of(ErrorMotion straightness, std::span<const L
   return found == lines.end() ? otherwise : std::span<const double>(found->positions_m);
 }
 
-/// Whether two lines along an axis are less than 1 mm apart.
+/// True if two lines along an axis are less than 1 mm apart.
 bool same_line(const Vector3& a_m, const Vector3& b_m, Axis along) {
   constexpr double kSameLine_m = 1e-3;
   Vector3 apart = a_m - b_m;

@@ -36,7 +36,7 @@ std::string largest_shares(const Eigen::VectorXd& shares, const DatumOptions& op
   return list;
 }
 
-/// RankDeficient if an unknown has no observation.
+/// Returns RankDeficient if an unknown has no observation.
 Result<void> check_every_unknown(const Information& data, const DatumOptions& options) {
   Eigen::VectorXd unobserved(static_cast<Eigen::Index>(data.unknowns()));
   for (std::size_t i = 0; i < data.unknowns(); ++i) {
@@ -94,8 +94,8 @@ Information bordered_rows(const Information& data, const Eigen::MatrixXd& K,
   return bordered;
 }
 
-/// RankDeficient, with the names of the unknowns, if data of this rank and the conditions together
-/// do not determine all unknowns.
+/// Returns RankDeficient, with the names of the unknowns, if data of this rank and the conditions
+/// together do not determine all unknowns.
 Result<void> check_rank(const Information& data, std::size_t rank, const Eigen::MatrixXd& K,
                         const DatumOptions& options) {
   const std::size_t with_conditions = rank + static_cast<std::size_t>(K.rows());

@@ -1,4 +1,5 @@
 #pragma once
+/// Adds rows to a triangular matrix: the inner loop of Information (estimation/information.hpp).
 
 #include <cstddef>
 

@@ -265,8 +265,9 @@ std::vector<Index> Quickhull::outside_from(Index first_triangle) const {
 Index Quickhull::apex_above(Index triangle) const {
   const Triangle& t = triangles_[triangle];
   const auto above = [&](Index p) { return height_cells(t, p); };
-  // Of points on an edge the corner at its end must be selected, which may be assigned to another
-  // triangle than the points on the edge. AllPoints therefore searches the points of all triangles.
+  // Of points on an edge the corner at its end must be selected. This corner may be assigned to
+  // another triangle than the points on the edge. AllPoints therefore searches the points of all
+  // triangles.
   return apex_from_ == ApexFrom::AllPoints ? extreme(outside_from(triangle), above)
                                            : extreme(t.outside, above);
 }

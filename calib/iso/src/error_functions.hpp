@@ -1,4 +1,5 @@
 #pragma once
+/// Value and uncertainty of linear functions of the parameters of a model.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -108,7 +109,8 @@ template <class Statistic>
 struct Bidirectional {
   Value E, B;
 };
-/// nullopt if the measurement does not determine the difference between the directions.
+/// Computes E and B. nullopt if the measurement does not determine the difference between the
+/// directions.
 [[nodiscard]] std::optional<Bidirectional> bidirectional_of(const ErrorFunctions&,
                                                             const Eigen::MatrixXd& up,
                                                             const Eigen::MatrixXd& down);

@@ -1,4 +1,5 @@
 #pragma once
+/// Explanations of a contradiction between two parts (joint/identify.hpp).
 
 #include "abbe/calib/internal/joint/pair_problem.hpp"
 #include "abbe/calib/joint/identify.hpp"

@@ -1,4 +1,5 @@
 #pragma once
+/// Upper limit of a noise variance that was estimated (joint/identify.hpp).
 
 #include <algorithm>
 #include <cmath>

@@ -40,7 +40,8 @@ Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
   return left;
 }
 
-/// BadInput for a step that gives too many grid points, for example a step in um instead of mm.
+/// Returns BadInput for a step that gives too many grid points, for example a step in um instead of
+/// mm.
 Result<void> check_step(const ReadingBox& box, const Comparison& c) {
   constexpr double kMostPlaces = 1e6;
   const double places = (2.0 * box.half_width_m).cwiseQuotient(c.step_m).array().max(1.0).prod();

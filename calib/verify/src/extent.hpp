@@ -16,9 +16,9 @@ struct Extent {
   [[nodiscard]] double diagonal_m() const { return 2.0 * half_width_m.norm(); }
 };
 
-/// DegenerateGeometry unless the points span a volume: in scaled coordinates, their smallest
-/// principal extent must be more than 1/1000 of the largest. TooFewObservations for fewer than 4
-/// points.
+/// Computes the box. DegenerateGeometry unless the points span a volume: in scaled coordinates,
+/// their smallest principal extent must be more than 1/1000 of the largest. TooFewObservations for
+/// fewer than 4 points.
 [[nodiscard]] Result<Extent> extent_of(std::span<const Vector3> points_m);
 
 }  // namespace abbe::calib::verify

@@ -1,4 +1,5 @@
 #pragma once
+/// Tests the usual mistakes (geometry/usual_mistakes.hpp) in the points of a verification.
 
 #include <span>
 #include <string>

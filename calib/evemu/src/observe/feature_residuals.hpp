@@ -1,4 +1,5 @@
 #pragma once
+/// Residuals of the touches of a ball array to the fitted surfaces of its balls and faces.
 
 #include <Eigen/Core>
 #include <cstddef>

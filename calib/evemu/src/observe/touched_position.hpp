@@ -1,4 +1,5 @@
 #pragma once
+/// Sorts the touches of a ball array by position, and fits the array at one position.
 
 #include <map>
 #include <span>

@@ -1,4 +1,6 @@
 #pragma once
+/// Finds the misfit of a ball array (abbe/calib/model/misfit.hpp) from the scatter of the ball
+/// centres.
 
 #include <optional>
 

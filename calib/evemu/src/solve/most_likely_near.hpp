@@ -1,4 +1,5 @@
 #pragma once
+/// Search for the most likely hyper-parameters (prior.hpp) from a given starting point.
 
 #include <Eigen/Core>
 #include <span>

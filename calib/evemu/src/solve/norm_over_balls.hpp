@@ -1,4 +1,5 @@
 #pragma once
+/// Compares models of a ball array by their V at the balls.
 
 #include "abbe/calib/evemu/observe/observe.hpp"
 #include "abbe/calib/geometry/scaled_design.hpp"

@@ -1,4 +1,6 @@
 #pragma once
+/// Estimates slow noise relative to the noise of a ball centre, by the marginal likelihood
+/// (noise.hpp, prior.hpp).
 
 #include <string>
 

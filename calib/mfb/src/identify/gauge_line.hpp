@@ -41,7 +41,8 @@ struct GaugeLine {
 /// standard uncertainty of the directions of gauge and bar.
 [[nodiscard]] double most_angle_rad(const StepGauge& gauge, const BarLine& bar);
 
-/// BadInput if the angle between the line of the touches and the bar exceeds most_angle_rad().
+/// Returns BadInput if the angle between the line of the touches and the bar exceeds
+/// most_angle_rad().
 [[nodiscard]] Result<void> check_alignment(const StepGauge& gauge, const GaugeLine& line,
                                            const BarLine& bar);
 

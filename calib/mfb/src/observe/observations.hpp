@@ -1,4 +1,5 @@
 #pragma once
+/// Functions that observe() and planned_observations() both use.
 
 #include <map>
 #include <memory>

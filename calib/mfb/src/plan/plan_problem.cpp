@@ -64,7 +64,7 @@ Eigen::MatrixXd SetProblem::slope(const State& s) {
 }
 
 Eigen::VectorXd SetProblem::u2_with(const State& s, const PositionInformation& position) {
-  // With A C A^T + I = L L^T the covariance falls by (L^-1 A C)^T (L^-1 A C).
+  // With A C A^T + I = L L^T, the rows A decrease the covariance by (L^-1 A C)^T (L^-1 A C).
   Eigen::MatrixXd S = position.rows * s.C * position.rows.transpose();
   S.diagonal().array() += 1.0;
   Eigen::MatrixXd Y = position.rows * s.B;

@@ -11,7 +11,7 @@ namespace abbe::calib::mfb {
 /// Mean of the passes of one position with one tool.
 struct Profile {
   std::vector<std::size_t> passes;
-  Matrix3 axes = Matrix3::Identity();  ///< of the bar
+  Matrix3 axes = Matrix3::Identity();  ///< axes of the bar as columns
   Vector3 tool_m = Vector3::Zero();
   std::vector<Vector3> tip_m;      ///< place of the tip at each hole, in the order of `hole`
   std::vector<Vector3> on_axis_m;  ///< nominal place of each hole, projected on the bar axis x

@@ -1,4 +1,5 @@
 #pragma once
+/// Adds the visits of reference nests to the observations of a run.
 
 #include "abbe/calib/otf/observe/observe.hpp"
 #include "observe/run_times.hpp"

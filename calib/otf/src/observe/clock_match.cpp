@@ -55,7 +55,7 @@ double median_speed_m_s(std::span<const TimedPoint> points) {
 class SteppedLog {
  public:
   SteppedLog(const EncoderLines& lines, double wanted_step_s) {
-    constexpr double kMostSteps = 1e6;  // of memory: 24 MB
+    constexpr double kMostSteps = 1e6;  // they take 24 MB
     const std::span<const EncoderReading> readings = lines.readings();
     const double span_s = readings.back().time_s;
     step_s_ = std::max(wanted_step_s, span_s / kMostSteps);

@@ -1,4 +1,5 @@
 #pragma once
+/// Columns of the rigid unknowns of the tracker station.
 
 #include <cstddef>
 

@@ -1,4 +1,5 @@
 #pragma once
+/// Begin and end of a run, and the times of its segments or standstills.
 
 #include <vector>
 

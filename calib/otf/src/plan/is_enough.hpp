@@ -1,4 +1,5 @@
 #pragma once
+/// Tells whether the caller wants to end the improvement of a path.
 
 #include "abbe/calib/otf/plan/plan.hpp"
 

@@ -48,8 +48,8 @@ Result<Path> walk(const PlanProblem& problem, std::span<const Vector3> lattice,
       });
 }
 
-/// BadInput for a budget that is too short. The text contains the length that a walk on this
-/// lattice needs to determine the model.
+/// Returns the BadInput for a budget that is too short. The text contains the length that a walk on
+/// this lattice needs to determine the model.
 Result<Path> too_short(const PlanProblem& problem, std::span<const Vector3> lattice,
                        const PlanOptions& options, double walked_m) {
   PathBudget more{.length_m = std::max(walked_m, 1.0)};

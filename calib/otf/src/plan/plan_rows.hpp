@@ -1,4 +1,5 @@
 #pragma once
+/// Rows of a run that is only planned.
 
 #include <cstddef>
 

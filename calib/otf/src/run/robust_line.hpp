@@ -1,4 +1,5 @@
 #pragma once
+/// A straight line through points of which many may be wrong.
 
 #include <cstddef>
 #include <span>

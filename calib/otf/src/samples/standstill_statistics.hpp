@@ -28,8 +28,8 @@ struct StandstillSamples {
                                               std::size_t last);
 
 /// For m = 1, 2, 4, ...: sums over standstills of m times the variance of the means of m successive
-/// samples. With a correlated noise that is shorter than m samples, a mean of n samples has the
-/// variance of n / m independent means of m.
+/// samples. If the correlation of the noise extends over fewer than m samples, a mean of n samples
+/// has the variance of n / m independent means of m.
 class MeanVariances {
  public:
   void add(std::span<const Vector3> residual_m);

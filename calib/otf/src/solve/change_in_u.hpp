@@ -1,4 +1,5 @@
 #pragma once
+/// Convergence criterion of the simultaneous adjustment.
 
 #include <Eigen/Dense>
 #include <cmath>

@@ -1,4 +1,5 @@
 #pragma once
+/// Statistics of the fit of a run.
 
 #include <cstddef>
 

@@ -261,7 +261,7 @@ std::string first_missed(const StandstillAssignment& a, const Problem& p, const 
   return text;
 }
 
-/// AlignmentFailed if too many points are unassigned, or too far apart.
+/// Returns AlignmentFailed if too many points are unassigned, or too far apart.
 Result<void> check_assignment(const StandstillAssignment& a, const Problem& p, const Path& path,
                               const Options& options) {
   const double most = options.standstill.most_unmatched;

@@ -41,10 +41,11 @@ inline constexpr double kCo2PerPpm = 5.34e-7;
 /// commonly stated for both between 0 and 50 C. Shop-floor formula: 1.5e-7, as stated with it.
 [[nodiscard]] double u_of_equation(IndexEquation equation) noexcept;
 
-/// BadInput: air outside 0 to 50 C, 500 to 1200 hPa, 0 to 105 % relative humidity or 0 to 2000 ppm
-/// of CO2, a wavelength outside 0.35 to 1.2 um, NaN anywhere, a negative uncertainty. Ciddor and
-/// Edlen take CO2 into account with kCo2PerPpm. The shop-floor formula is for 633 nm and 450 ppm of
-/// CO2 and ignores the given wavelength; the effect of a different CO2 content is added to u_n.
+/// Computes n with its uncertainty. Ciddor and Edlen take CO2 into account with kCo2PerPpm. The
+/// shop-floor formula is for 633 nm and 450 ppm of CO2 and ignores the given wavelength; the effect
+/// of a different CO2 content is added to u_n. BadInput: air outside 0 to 50 C, 500 to 1200 hPa, 0
+/// to 105 % relative humidity or 0 to 2000 ppm of CO2, a wavelength outside 0.35 to 1.2 um, NaN
+/// anywhere, a negative uncertainty.
 [[nodiscard]] Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelength_m,
                                                        IndexEquation equation);
 

@@ -61,8 +61,9 @@ class Datum {
 
   [[nodiscard]] const Eigen::MatrixXd& conditions() const { return K_; }
 
-  /// RankDeficient if an unknown has no observation, or if the data leave more combinations
-  /// undetermined than there are conditions. The text names only unknowns that are not determined.
+  /// Adjusts the data with the conditions. RankDeficient if an unknown has no observation, or if
+  /// the data leave more combinations undetermined than there are conditions. The text names only
+  /// unknowns that are not determined.
   [[nodiscard]] Result<DatumSolution> solve(const Information&, const DatumOptions& = {}) const;
   /// The U of solve() without covariance, in less time: the rank is judged by column pivoting
   /// instead of singular values.

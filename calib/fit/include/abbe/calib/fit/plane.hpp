@@ -20,7 +20,7 @@ struct Plane {
   ResidualStatistics residuals;
 };
 
-/// The scalar product of the normal with the vector `towards` is positive. NotFinite;
+/// Fits a plane. The scalar product of the normal with the vector `towards` is positive. NotFinite;
 /// TooFewObservations below 3 different points; DegenerateGeometry if the points lie on a line, or
 /// if `towards` is parallel to the plane and does not determine the side. `known_sigma`: standard
 /// deviation of a point along the normal, used instead of that of the residuals.

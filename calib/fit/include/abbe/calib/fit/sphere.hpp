@@ -23,10 +23,10 @@ struct Sphere {
   int iterations = 0;
 };
 
-/// NotFinite; TooFewObservations below 4 different points; DegenerateGeometry if they lie in a
-/// plane, or on a cap so flat that rounding decides the result; NotConverged if the iteration does
-/// not converge to a sphere. `known_sigma`: standard deviation of a point along the normal, used
-/// for the covariance instead of that of the residuals.
+/// Fits a sphere. NotFinite; TooFewObservations below 4 different points; DegenerateGeometry if
+/// they lie in a plane, or on a cap so flat that rounding decides the result; NotConverged if the
+/// iteration does not converge to a sphere. `known_sigma`: standard deviation of a point along the
+/// normal, used for the covariance instead of that of the residuals.
 [[nodiscard]] Result<Sphere> fit_sphere(std::span<const Vector3> points,
                                         std::optional<double> known_sigma = {});
 

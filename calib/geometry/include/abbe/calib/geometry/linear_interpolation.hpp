@@ -27,7 +27,8 @@ struct BasisRow {
 /// be ascending, at least 2.
 [[nodiscard]] BasisRow basis_row(std::span<const double> nodes_m, double position_m);
 
-/// BadInput or NotFinite unless there are at least 2 nodes, all finite and strictly ascending.
+/// Returns BadInput or NotFinite unless there are at least 2 nodes, all finite and strictly
+/// ascending.
 [[nodiscard]] Result<void> check_nodes(std::span<const double> nodes_m);
 
 }  // namespace abbe::calib

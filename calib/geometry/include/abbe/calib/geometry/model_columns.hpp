@@ -1,4 +1,5 @@
 #pragma once
+/// The non-zero columns of a model at one state of the machine.
 
 #include <cstddef>
 #include <span>

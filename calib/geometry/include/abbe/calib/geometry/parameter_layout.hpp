@@ -39,7 +39,8 @@ class ParameterLayout {
   [[nodiscard]] static Result<ParameterLayout> with_tables(const KinematicChain&, MachineNodes,
                                                            std::span<const ErrorMotion>);
 
-  /// The same layout with squareness errors that act on the distance from this axis position.
+  /// Returns the same layout, but with squareness errors that act on the distance from this axis
+  /// position.
   [[nodiscard]] ParameterLayout with_squareness_from(const Vector3& axis_position_m) const;
 
   [[nodiscard]] const KinematicChain& chain() const { return chain_; }

@@ -1,4 +1,5 @@
 #pragma once
+/// Standard uncertainties that show the contribution of each part to a joint model (identify.hpp).
 
 #include <optional>
 #include <span>

@@ -17,8 +17,10 @@ struct VectorStatistics {
 [[nodiscard]] VectorStatistics vector_statistics(std::span<const Vector3> v_m);
 
 struct ModelDifference {
-  VectorStatistics as_stated;       ///< of the difference of V in the datums of the models
-  VectorStatistics rigid_free;      ///< of the difference minus its best-fit rigid motion T + r x p
+  VectorStatistics as_stated;       ///< statistics of the difference of V in the datums of the
+                                    ///< models
+  VectorStatistics rigid_free;      ///< statistics of the difference minus its best-fit rigid
+                                    ///< motion T + r x p
   Vector6 rigid = Vector6::Zero();  ///< the removed tx ty tz [m], rx ry rz [rad]
 };
 

@@ -1,4 +1,5 @@
 #pragma once
+/// Root sum of squares with bit-identical results on every processor.
 
 #include <cmath>
 

@@ -27,7 +27,7 @@ struct MeasuredPoint {
   Vector3 measured_m = Vector3::Zero();  ///< in the instrument's frame
 };
 
-/// How the measured points are transformed to machine coordinates.
+/// Transformation of the measured points to machine coordinates.
 /// - BestFit: by T_machine_tracker, which is fitted to the points.
 /// - Machine: the axes of the instrument are already parallel to those of the machine; V keeps its
 ///   rotation and the unknown constant vector between reflector and axis positions.

@@ -7,7 +7,7 @@
 
 namespace abbe::calib {
 
-/// NotConverged if `stopped` returns true. `stopped` may be empty.
+/// Returns NotConverged if `stopped` returns true. `stopped` may be empty.
 [[nodiscard]] inline Result<void> check_stopped(const std::function<bool()>& stopped) {
   if (stopped && stopped()) {
     return failure(ErrorCode::NotConverged, "identification: stopped before its end");

@@ -21,7 +21,7 @@ struct Scatter {
 [[nodiscard]] Eigen::MatrixXd covariance_of_runs(const Runs&, const std::optional<ErrorMotion>&,
                                                  const Scatter&, const Eigen::MatrixXd& P);
 
-/// Whether the uncertainty of the measured values is known: from the scatter, or stated as
+/// True if the uncertainty of the measured values is known: from the scatter, or stated as
 /// DeviceUncertainty::u_m or u_rad. An uncertainty of the scale alone is not enough.
 [[nodiscard]] bool uncertainty_known(const std::optional<ErrorMotion>&, const Scatter&,
                                      const DeviceUncertainty&);

@@ -82,7 +82,7 @@ struct SparseOptions {
   /// Grid to choose from; empty: the grid of [Li OMM], 100 lambdas 1e-1 .. 1e-10 mm, 50 gammas up
   /// to 100.
   std::vector<double> lambda{}, gamma{};
-  std::uint64_t seed = 1;                ///< of the bootstrap, and of folds over rows
+  std::uint64_t seed = 1;                ///< seed of the bootstrap, and of random folds over rows
   int bootstrap_runs = 100;              ///< 100 give a standard deviation to 7 %; at least 2
   std::optional<SparseChoice> chosen{};  ///< if set, used without a search
   /// Limit of coordinate-descent sweeps of the path to the chosen lambda, in the fit and in every
@@ -129,7 +129,7 @@ struct Statistics {
 struct ReferenceFit {
   std::size_t points = 0;            ///< number of points used
   std::vector<std::size_t> outside;  ///< numbers, from 1, of points outside the hull: not used
-  double chi2 = 0.0;                 ///< of the residuals after rotation and translation
+  double chi2 = 0.0;                 ///< chi-square of the residuals after rotation and translation
   double dof = 0.0;
   double widened = 1.0;  ///< the rotation's covariance was multiplied by this because of chi2
 };

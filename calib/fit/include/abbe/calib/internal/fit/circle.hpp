@@ -22,9 +22,10 @@ struct Circle {
   int iterations = 0;
 };
 
-/// NotFinite; TooFewObservations below 3 different points; DegenerateGeometry if they lie on a
-/// line; NotConverged if the iteration does not converge to a circle. `known_sigma`: standard
-/// deviation of a point along the normal, used for the covariance instead of that of the residuals.
+/// Fits a circle. NotFinite; TooFewObservations below 3 different points; DegenerateGeometry if
+/// they lie on a line; NotConverged if the iteration does not converge to a circle. `known_sigma`:
+/// standard deviation of a point along the normal, used for the covariance instead of that of the
+/// residuals.
 [[nodiscard]] Result<Circle> fit_circle(std::span<const Eigen::Vector2d> points,
                                         std::optional<double> known_sigma = {});
 

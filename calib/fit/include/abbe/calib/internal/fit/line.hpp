@@ -23,11 +23,11 @@ struct Line {
   ResidualStatistics residuals;
 };
 
-/// The scalar product of the direction with the vector `towards` is positive. NotFinite;
-/// TooFewObservations below 2 different points; DegenerateGeometry if the points extend equally in
-/// two directions, or if `towards` is perpendicular to the line and does not determine its
-/// direction. `known_sigma`: standard deviation of a point in one direction across the line, used
-/// instead of that of the residuals.
+/// Fits a line. The scalar product of the direction with the vector `towards` is positive.
+/// NotFinite; TooFewObservations below 2 different points; DegenerateGeometry if the points extend
+/// equally in two directions, or if `towards` is perpendicular to the line and does not determine
+/// its direction. `known_sigma`: standard deviation of a point in one direction across the line,
+/// used instead of that of the residuals.
 [[nodiscard]] Result<Line> fit_line(std::span<const Vector3> points, const Vector3& towards,
                                     std::optional<double> known_sigma = {});
 

@@ -1,4 +1,5 @@
 #pragma once
+/// Effect of length errors of the scales on a model with tables.
 
 #include <Eigen/Dense>
 

@@ -1,4 +1,5 @@
 #pragma once
+/// Positions at which a model of cubic tables is checked.
 
 #include "abbe/calib/geometry/axis_table.hpp"
 

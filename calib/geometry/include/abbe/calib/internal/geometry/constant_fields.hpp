@@ -1,4 +1,5 @@
 #pragma once
+/// Fields V that are constant in space, as coefficients of the scaled design.
 
 #include <Eigen/Core>
 

@@ -1,4 +1,5 @@
 #pragma once
+/// Root mean squares of V over a set of places, without rigid motion.
 
 #include <Eigen/Core>
 #include <span>

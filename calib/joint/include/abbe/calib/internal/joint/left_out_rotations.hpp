@@ -1,4 +1,5 @@
 #pragma once
+/// Rotations that a part with another tool has in addition to the common tables (joint/part.hpp).
 
 #include <Eigen/Core>
 #include <vector>

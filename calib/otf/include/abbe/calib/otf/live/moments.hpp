@@ -53,8 +53,8 @@ class MomentAccumulator {
     /// tracker.
     bool range_offset = false;
   };
-  /// NotApplicable if the interpolation of an axis is not linear. BadInput if a sigma of the noise
-  /// is not positive.
+  /// Creates an accumulator. NotApplicable if the interpolation of an axis is not linear. BadInput
+  /// if a sigma of the noise is not positive.
   [[nodiscard]] static Result<MomentAccumulator> of(Setup);
 
   /// Begins a leg: the next samples are measured on it. Axis positions in m; the ends must differ.

@@ -56,7 +56,8 @@ struct TablesSoFar {
   double variance_factor = 1.0;
 };
 
-/// Not thread-safe. Uses the memory of MomentAccumulator and of one pair for each vertex.
+/// Estimate of a run that is still being measured. Not thread-safe. Uses the memory of
+/// MomentAccumulator and of one pair for each vertex.
 class RunningEstimate {
  public:
   struct Setup {
@@ -65,7 +66,7 @@ class RunningEstimate {
     double corner_m = 0.010;  ///< Options::corner_m
     TravelDependence backlash = TravelDependence::None;
   };
-  /// Errors: those of the layout of the machine and of MomentAccumulator.
+  /// Creates an estimate. Errors: those of the layout of the machine and of MomentAccumulator.
   [[nodiscard]] static Result<RunningEstimate> of(Setup);
 
   /// Adds a pair: the machine is near a stop at `q_m`, and the tracker measured `p_tracker_m`.

@@ -71,9 +71,9 @@ struct Observations {
   std::vector<Vector3> vertices_m{};     ///< vertices of the path, axis positions
   std::vector<AxisTravel> travel{};      ///< by Observation::leg; a missing leg has unknown
                                          ///< directions
-  double u_scale = 0.0;                  ///< see Noise
-  std::array<double, 3> u_axis_scale{};  ///< see Noise
-  double u_range_offset_m = 0.0;         ///< see Noise
+  double u_scale = 0.0;                  ///< copy of Noise::u_scale
+  std::array<double, 3> u_axis_scale{};  ///< copy of Noise::u_axis_scale
+  double u_range_offset_m = 0.0;         ///< copy of Noise::u_range_offset_m
   std::vector<Vector3> covered_m{};      ///< axis positions; their hull is the validity volume
   std::size_t samples = 0;
   std::size_t lost_samples = 0;
@@ -82,7 +82,7 @@ struct Observations {
   /// Mean time by Observation::segment, tracker's clock. Empty for segments without times.
   std::vector<double> segment_s{};
   std::size_t clock_unknowns = 0;  ///< kClockUnknowns with scale readings and unknown clocks
-  std::vector<std::size_t> beam_returned{};  ///< see SegmentSeries
+  std::vector<std::size_t> beam_returned{};  ///< copy of SegmentSeries::beam_returned
   SetAside set_aside{};
   std::optional<DriftObservations> drift{};  ///< data of nests, if they were visited repeatedly
   /// Prior for smooth tables; every adjustment of these rows uses it.

@@ -38,7 +38,7 @@ struct Segment {
 /// Segments of equal duration, in the order of time.
 struct SegmentSeries {
   std::vector<Segment> segments;
-  std::vector<Vector3> sub_points_tracker_m;  ///< of every usable segment, evenly spaced
+  std::vector<Vector3> sub_points_tracker_m;  ///< sub-points of every usable segment, evenly spaced
   /// Number of sub-points per segment: Options::row_points, or fewer if a segment has fewer
   /// samples.
   std::size_t sub_points = 0;

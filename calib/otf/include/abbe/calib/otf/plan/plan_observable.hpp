@@ -29,8 +29,8 @@ struct Observability {
 [[nodiscard]] Result<Observability> observability(
     const Path&, const Machine&, TravelDependence backlash = TravelDependence::None);
 
-/// RankDeficient if the path leaves errors undetermined. The text names them, the parts of the
-/// travel that the path does not reach, and the legs that are not used because of backlash.
+/// Returns RankDeficient if the path leaves errors undetermined. The text names them, the parts of
+/// the travel that the path does not reach, and the legs that are not used because of backlash.
 [[nodiscard]] Result<void> check_observable(const Path&, const Machine&,
                                             TravelDependence backlash = TravelDependence::None);
 

@@ -34,7 +34,7 @@ struct PlannedRun {
   Vector3 tracker_m = Vector3::Zero();  ///< centre of the tracker, machine coordinates
   Noise noise;
   Drive drive;
-  double points_per_s = 500.0;  ///< of the tracker
+  double points_per_s = 500.0;  ///< point rate of the tracker
   /// As Options::backlash: the differences are additional unknowns of the prediction, and legs on
   /// which a direction of travel is not known are not used.
   TravelDependence backlash = TravelDependence::None;
@@ -59,7 +59,8 @@ struct TableUncertainty {
 
 struct PlaceUncertainty {
   Vector3 axis_position_m = Vector3::Zero();
-  double u_m = 0.0;  ///< of V without the rigid motion: root of the trace of its covariance
+  double u_m = 0.0;  ///< standard uncertainty of V without the rigid motion: root of the trace of
+                     ///< its covariance
 };
 
 struct Prediction {

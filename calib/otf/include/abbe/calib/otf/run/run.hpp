@@ -110,9 +110,9 @@ struct Options {
   StandstillOptions standstill;  ///< options of Mode::Standstill
   /// Estimator of Mode::OnTheFly; standstills are always adjusted by TwoStep.
   Estimator estimator = Estimator::Simultaneous;
-  /// None: the tables are the mean of both directions of travel, and backlash stays in the
-  /// residuals. Backlash, Tables: the differences between both directions are estimated, too, one
-  /// value per table or one per node (backlash.hpp).
+  /// Dependence of the tables on the direction of travel. None: the tables are the mean of both
+  /// directions, and backlash stays in the residuals. Backlash, Tables: the differences between
+  /// both directions are estimated, too, one value per table or one per node (backlash.hpp).
   TravelDependence backlash = TravelDependence::None;
   /// Samples per segment mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
   /// compared with nodes 50 mm apart.

@@ -1,4 +1,5 @@
 #pragma once
+/// Direction of travel of each axis along a path, on which backlash depends.
 
 #include <span>
 #include <vector>

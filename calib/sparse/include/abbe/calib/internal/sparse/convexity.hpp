@@ -1,4 +1,6 @@
 #pragma once
+/// Tests whether the objective of penalised least squares (penalty.hpp) is convex around a
+/// solution.
 
 #include <Eigen/Core>
 #include <optional>

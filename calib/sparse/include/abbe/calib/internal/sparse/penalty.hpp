@@ -31,7 +31,7 @@ struct Penalty {
   double gamma = 3.7;  ///< 3.7: the value [Fan 2001] recommends for SCAD; 3 is customary for MCP
 };
 
-/// BadInput if gamma is too small for the kind, NotFinite if it is NaN or infinite.
+/// Returns BadInput if gamma is too small for the kind, NotFinite if it is NaN or infinite.
 [[nodiscard]] Result<void> check(const Penalty&);
 
 /// Largest downward curvature of p: 1/gamma for MCP, 1/(gamma - 1) for SCAD, 0 for the lasso.

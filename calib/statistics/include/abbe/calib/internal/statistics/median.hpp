@@ -1,4 +1,5 @@
 #pragma once
+/// Median, and the factor that converts a median absolute deviation to a standard deviation.
 
 #include <algorithm>
 #include <iterator>

@@ -1,4 +1,5 @@
 #pragma once
+/// Singular values of a matrix.
 
 #include <Eigen/Core>
 

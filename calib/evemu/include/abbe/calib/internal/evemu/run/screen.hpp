@@ -7,10 +7,10 @@
 
 namespace abbe::calib::evemu {
 
-/// With the hyper-parameters of an estimate, the observed errors y have the covariance s^2 1 + U
-/// U^T. U: columns of design, pose rotations and array, each times its prior standard deviation. Q
-/// R is the QR decomposition of the stacked matrix [U; s 1]; Q1: the rows of Q that belong to U.
-/// Then
+/// Computes likelihood ratios from one QR decomposition. With the hyper-parameters of an estimate,
+/// the observed errors y have the covariance s^2 1 + U U^T. U: columns of design, pose rotations
+/// and array, each times its prior standard deviation. Q R is the QR decomposition of the stacked
+/// matrix [U; s 1]; Q1: the rows of Q that belong to U. Then
 ///     (s^2 1 + U U^T)^-1 = (1 - Q1 Q1^T) / s^2.
 class Screen {
  public:

@@ -20,7 +20,7 @@ namespace abbe::calib::mfb {
 using BarPass = std::vector<Vector3>;
 
 struct ReversalRuns {
-  std::vector<BarPass> normal, reversed;  ///< the same number of repeats of both
+  std::vector<BarPass> normal, reversed;  ///< one pass per repeat; the same number of both
   std::vector<double> machine_x_m;        ///< E_XX of the machine at each hole, on the bar's line
   std::vector<double> u_machine_x_m;  ///< standard uncertainty of machine_x_m; empty: not known,
                                       ///< counts as 0

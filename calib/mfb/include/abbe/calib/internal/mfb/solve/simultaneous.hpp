@@ -41,7 +41,8 @@ struct SharedEstimate {
 /// adjustment minimises.
 [[nodiscard]] Result<double> whole_chi2(const Observations&, const NuisanceOptions&);
 
-/// RankDeficient if an uncertainty exceeds the limits; the text names the errors.
+/// Returns RankDeficient if an uncertainty exceeds the limits of the options; the text names the
+/// errors.
 [[nodiscard]] Result<void> check_shown(const Observations&, const Solution&, const SolveOptions&);
 
 }  // namespace abbe::calib::mfb

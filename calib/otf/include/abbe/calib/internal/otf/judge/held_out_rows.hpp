@@ -120,8 +120,8 @@ struct HeldOutSums {
       const Observations& o, std::span<const std::size_t> rows, Prediction predicted_m,
       const VolumetricModel* other_model, Left left,
       Effect effect_m = [](std::size_t) { return 0.0; }) {
-    // Not used: a best-fit rigid motion would fit these rows exactly, because they are not more
-    // than its unknowns.
+    // So few rows are not used: a best-fit rigid motion would fit them exactly, because it has as
+    // many unknowns.
     if (rows.size() <= kRigidUnknowns) {
       return;
     }

@@ -15,7 +15,7 @@
 namespace abbe::calib::direct {
 namespace {
 
-constexpr double kRounding = 1e-12;  // m or rad
+constexpr double kRounding = 1e-12;  // a smaller difference is rounding; m or rad
 constexpr double kNeverFits = std::numeric_limits<double>::infinity();
 constexpr std::size_t kLeastDof = 3;
 constexpr double kMostOutside = 0.3;  // largest share of the positions that a correction may move
@@ -24,7 +24,7 @@ constexpr double kMostOutside = 0.3;  // largest share of the positions that a c
 /// The measured values after a correction.
 struct CorrectedValues {
   std::string text;
-  std::vector<double> positions_m;  // any order
+  std::vector<double> positions_m;  // in any order
   Eigen::VectorXd values;
   std::size_t parameters = 0;  // number of parameters of the correction that are estimated from the
                                // values
@@ -149,8 +149,7 @@ class CauseSearch {
   /// Factors below kLeastShare are not tried: a factor that moves all positions to nearly one place
   /// would hide every difference.
   void add_units_of_positions(std::vector<CorrectedValues>& all) const {
-    constexpr double kLeastShare = 0.1;  // smallest length after the correction / length of the
-                                         // table
+    constexpr double kLeastShare = 0.1;  // least corrected length / length of the table
     const std::vector<double>& nodes_m = curve_.nodes().nodes_m;
     const auto [first, last] = std::ranges::minmax(given_.positions_m);
     const double least_factor = kLeastShare * (nodes_m.back() - nodes_m.front()) / (last - first);

@@ -51,10 +51,14 @@ double ciddor(const Air& air, double wavelength_m) {
   const double r_as = 1e-8 * (5792105.0 / (238.0185 - S) + 167917.0 / (57.362 - S));
   const double r_vs = 1.022e-8 * (295.235 + 2.6422 * S - 0.03238 * S * S + 0.004028 * S * S * S);
   const double r_axs = r_as * co2_factor(air);
-  const double M_a = 0.0289635 + 1.2011e-8 * (air.co2_ppm - 400.0);  // kg/mol, dry air
-  constexpr double kMolarVapour = 0.018015;                          // kg/mol
-  constexpr double kStandardCompressibility = 0.9995922115;          // dry air, 15 C, 101325 Pa
-  constexpr double kVapourDensity = 0.00985938;                      // kg/m3 at 20 C, 1333 Pa
+  // molar mass of dry air in kg/mol
+  const double M_a = 0.0289635 + 1.2011e-8 * (air.co2_ppm - 400.0);
+  // molar mass of water vapour in kg/mol
+  constexpr double kMolarVapour = 0.018015;
+  // compressibility of dry air at 15 C and 101325 Pa
+  constexpr double kStandardCompressibility = 0.9995922115;
+  // density of water vapour in kg/m3 at 20 C and 1333 Pa
+  constexpr double kVapourDensity = 0.00985938;
 
   const double rho_axs = 101325.0 * M_a / (kStandardCompressibility * kGasConstant * 288.15);
   const double ZRT = compressibility(p, T, x_v) * kGasConstant * T;
@@ -124,7 +128,7 @@ struct Range {
 };
 
 bool within(double value, double min, double max) {
-  return value >= min && value <= max;  // false for NaN
+  return value >= min && value <= max;  // NaN gives false
 }
 
 }  // namespace

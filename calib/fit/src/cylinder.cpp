@@ -13,7 +13,7 @@
 namespace abbe::calib::fit {
 namespace {
 
-constexpr std::size_t kUnknownsOfCylinder = 5;  // alpha, beta, u, v, w
+constexpr std::size_t kUnknownsOfCylinder = 5;  // the unknowns alpha, beta, u, v, w of cylinder.hpp
 /// Condition of the Jacobian above which rounding decides the result.
 constexpr double kUndetermined = 1e10;
 

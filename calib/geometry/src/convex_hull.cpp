@@ -42,7 +42,7 @@ Vector3 rounded(const WideVector& v) {
 struct Triangle {
   std::array<Index, 3> corner{};  ///< anticlockwise seen from outside
   std::array<Index, 3> beyond{};  ///< [k]: neighbour triangle at the edge from corner k to k + 1
-  WideVector normal{};            ///< outward, exact
+  WideVector normal{};            ///< outward normal, exact
   double length = 0.0;            ///< length of the normal
   std::vector<Index> outside{};   ///< points assigned to this triangle; they are above it
   bool removed = false;

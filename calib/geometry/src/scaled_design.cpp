@@ -11,7 +11,7 @@
 namespace abbe::calib {
 namespace {
 
-using Coefficients = std::array<double, kMostOrder + 1>;  ///< of 1, q, q^2 ...
+using Coefficients = std::array<double, kMostOrder + 1>;  ///< coefficients of 1, q, q^2 ...
 
 std::size_t axis_of(const EquivalentModel& model, std::size_t row) {
   Eigen::Index coefficient = 0;

@@ -36,8 +36,8 @@ Positioning positioning_of(const ErrorFunctions& functions, const AxisLine& line
 /// w_i: the part of the travel nearest to target i; M: the integrals of the products of the hat
 /// functions of the targets, tridiagonal.
 struct ReferenceLine {
-  Eigen::RowVectorXd mean, slope;  ///< weights of the values
-  Eigen::VectorXd from_mean_m;     ///< q
+  Eigen::RowVectorXd mean, slope;  ///< weights of the values f_i
+  Eigen::VectorXd from_mean_m;     ///< the vector q
 
   explicit ReferenceLine(const std::vector<double>& targets_m) {
     const Eigen::Index n = std::ssize(targets_m);

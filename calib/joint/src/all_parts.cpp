@@ -32,7 +32,7 @@ std::vector<std::string> shared_effects(std::span<const Part> parts) {
 
 /// Orthonormal basis of the space that the columns of A span.
 Eigen::MatrixXd basis_of_columns(Eigen::MatrixXd A) {
-  constexpr double kRounding = 1e-10;  // as in determining_rows()
+  constexpr double kRounding = 1e-10;  // the same limit as in determining_rows()
   for (auto column : A.colwise()) {
     const double length = column.norm();
     column *= length > 0.0 ? 1.0 / length : 1.0;

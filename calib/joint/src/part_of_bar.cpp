@@ -76,7 +76,7 @@ Result<Eigen::MatrixXd> all_tables_in_datum(const CommonTables& common, const Ta
 }
 
 bool same_nodes(const AxisNodes& a, const AxisNodes& b) {
-  constexpr double kSame_m = 1e-9;  // files contain decimal numbers in mm
+  constexpr double kSame_m = 1e-9;  // larger than the rounding of decimal numbers in files (mm)
   const auto same = [](double x_m, double y_m) { return std::abs(x_m - y_m) < kSame_m; };
   return std::equal(a.nodes_m.begin(), a.nodes_m.end(), b.nodes_m.begin(), b.nodes_m.end(), same) &&
          same(a.reference_m, b.reference_m);

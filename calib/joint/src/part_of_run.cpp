@@ -87,7 +87,7 @@ Result<void> check_offset(const std::string& part, const CommonEffects& effects,
 /// Text such as "has 4 nodes of X, not 5"; empty if nodes, reference and interpolation of the axis
 /// are the same.
 std::string difference_of_axis(Axis axis, const TableBasis& own, const TableBasis& common) {
-  constexpr double kSame_m = 1e-9;  // files contain decimal numbers in mm
+  constexpr double kSame_m = 1e-9;  // larger than the rounding of decimal numbers in files (mm)
   const AxisNodes &x = own.layout().nodes()[index(axis)], &y = common.layout().nodes()[index(axis)];
   if (x.nodes_m.size() != y.nodes_m.size()) {
     return message("has ", x.nodes_m.size(), " nodes of ", letter(axis), ", not ",

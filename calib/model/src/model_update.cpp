@@ -83,7 +83,7 @@ void add_process_noise(Eigen::MatrixXd& C, const DatumCoordinates& c, const Para
 /// The range offset of a model in the coordinates e; nullopt: the model does not share its offset.
 struct OffsetInCoordinates {
   const OffsetInModel* of_model = nullptr;
-  Eigen::VectorXd g;  ///< N^T dU_dd
+  Eigen::VectorXd g;  ///< the vector N^T dU_dd
 };
 std::optional<OffsetInCoordinates> in_coordinates(const std::optional<OffsetInModel>& offset,
                                                   const Eigen::MatrixXd& N) {

@@ -20,7 +20,7 @@ constexpr std::size_t kLeastTouchesPerFeed = 3;  // a variance from two touches 
 struct Feed {
   double speed_m_s = 0.0;
   double along_m = 0.0;
-  double variance_m2 = 0.0;  ///< of one touch
+  double variance_m2 = 0.0;  ///< variance of one touch
   double count = 0.0;
 };
 

@@ -73,7 +73,7 @@ SinCos sin_cos(double angle_rad) noexcept {
   if (!(std::abs(angle_rad) <= kLargest_rad)) return {kNotANumber, kNotANumber};
   const double quarters = std::floor(angle_rad * (2.0 / std::numbers::pi) + 0.5);
   const double first = angle_rad - quarters * kHalfPi_1;  // both exact
-  const double second = quarters * kHalfPi_2;             // exact
+  const double second = quarters * kHalfPi_2;             // exact product
   const double difference = first - second;
   const double lost = (first - difference) - second - quarters * kHalfPi_3;
   const double r = difference + lost;
@@ -114,7 +114,7 @@ double natural_logarithm(double x) noexcept {
     --twos;
   }
 
-  const double f = fraction - 1.0;  // exact
+  const double f = fraction - 1.0;  // exact difference
   const double s = f / (2.0 + f);
   const double z = s * s;
   const double half_square = 0.5 * f * f;

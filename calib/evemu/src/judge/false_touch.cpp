@@ -124,7 +124,7 @@ std::vector<WithoutOne> without_each(const FeatureResiduals& f, std::optional<do
 /// True if leaving out the first touch of `without` reduces the residuals by clearly more than
 /// leaving out any other touch.
 bool is_clear(const std::vector<WithoutOne>& without, double sigma_m) {
-  constexpr double kClear = 10.0;  // twice the difference of the log likelihoods
+  constexpr double kClear = 10.0;  // limit of twice the difference of the log likelihoods
   return without.size() < 2 ||
          without[1].squares_m2 - without[0].squares_m2 > kClear * sigma_m * sigma_m;
 }

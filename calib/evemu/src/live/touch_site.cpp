@@ -119,7 +119,8 @@ bool Site::near_first_ball(const Vector3& p_m) const {
 bool Site::on_face(std::size_t block, const Vector3& p_m) const {
   const auto face = sure_face(points_[block], options_.observe.max_off_surface_m);
   if (!face) return false;
-  constexpr double kBeyond_m = 20e-3;  // beyond the known points: a face measures few centimetres
+  constexpr double kBeyond_m = 20e-3;  // permitted distance beyond the known points: a face
+                                       // measures only a few centimetres
   return std::abs((p_m - face->point).dot(face->normal)) <= options_.observe.max_off_surface_m &&
          (p_m - face->point).norm() <= 2.0 * spread_m(points_[block], face->point) + kBeyond_m;
 }

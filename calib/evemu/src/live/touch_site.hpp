@@ -96,7 +96,7 @@ class Site {
                                     ///< previous position
   bool ball1_measured_ = false;     ///< Ball1 has been measured at this position
   std::array<std::optional<double>, 2> sides_;  ///< known from previous positions
-  std::vector<std::vector<Vector3>> points_;    ///< by feature
+  std::vector<std::vector<Vector3>> points_;    ///< points of each feature
   std::vector<bool> accepted_;                  ///< by feature; only balls are accepted
   std::vector<Candidate> candidates_;           ///< assumptions that agree with all accepted balls
 };

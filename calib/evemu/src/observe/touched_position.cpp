@@ -108,7 +108,8 @@ Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
 /// Text "; they fit with ..." that names the mistaken unit of the touches: converted from this
 /// unit, the radii of the balls agree with those of the calibrator. Empty if they agree with none.
 std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator& c) {
-  constexpr double kSame = 0.05;  // relative: touches determine radii to a few per cent
+  constexpr double kSame = 0.05;  // relative difference of radii: touches determine a radius to a
+                                  // few per cent
   for (const UnitMistake& mistake : unit_mistakes()) {
     bool all = true;
     for (std::size_t i = 0; i < balls.size(); ++i) {

@@ -33,7 +33,7 @@ struct RunRows {
 struct Refit {
   HyperParameters hyper;
   Eigen::VectorXd c_m, d_m;       ///< coefficients of the design, and of the added columns
-  Eigen::MatrixXd covariance_m2;  ///< of the coefficients c_m
+  Eigen::MatrixXd covariance_m2;  ///< covariance of the coefficients c_m
 };
 /// Repeats the estimate. `X`: whitened rows of `design`; `C`: whitened columns added to them, with
 /// the prior standard deviation `size_m`. NotConverged if there is no likelihood near the

@@ -78,7 +78,7 @@ bool on_a_line(const Eigen::MatrixXd& J) {
 
 struct Turn {
   Vector3 omega_rad;
-  Eigen::Matrix3Xd K;  ///< omega = K r
+  Eigen::Matrix3Xd K;  ///< omega = K r, r: differences to the reference
   double chi2 = 0.0, dof = 0.0;
   std::size_t worst = 0;  ///< point with the largest residual
   double worst_m = 0.0;

@@ -121,7 +121,7 @@ Eigen::VectorXd whitened_deviations(const WholeSystem& system) {
 /// to it.
 struct PointOfPass {
   std::size_t measurement = 0, hole = 0;
-  Eigen::Index first = 0, rows = 0;  ///< rows of the pass
+  Eigen::Index first = 0, rows = 0;  ///< range of the rows of the pass
   Eigen::MatrixXd T;
   Matrix3 C = Matrix3::Zero();
 };

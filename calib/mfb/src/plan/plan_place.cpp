@@ -81,7 +81,7 @@ double BarPlacer::overhang_m(std::size_t axis) const {
   const std::vector<double>& nodes_m = task_->machine.nodes[axis].nodes_m;
   const double end_cell_m =
       std::min(nodes_m[1] - nodes_m[0], nodes_m.back() - nodes_m[nodes_m.size() - 2]);
-  constexpr double kRoundedPlace_m = 1e-4;  // plan_of()
+  constexpr double kRoundedPlace_m = 1e-4;  // plan_of() rounds places by up to this
   return std::min(task_->bar.pattern.hole_radius_m, 0.5 * end_cell_m - kRoundedPlace_m);
 }
 
@@ -142,7 +142,7 @@ std::optional<BarDirection> BarPlacer::along(std::size_t axis, std::size_t other
 std::optional<BarDirection> BarPlacer::diagonal(std::size_t first, std::size_t second, double sign,
                                                 const Vector3& z,
                                                 std::span<const std::size_t> styli) const {
-  constexpr int kMostSteps = 60;  // 30 degrees
+  constexpr int kMostSteps = 60;  // steps of half a degree: 30 degrees
   for (int step = 0; step <= kMostSteps; ++step) {
     for (const int side : {1, -1}) {
       const double angle_rad = 0.25 * std::numbers::pi + side * step * kHalfDegree_rad;

@@ -48,7 +48,7 @@ class AlternativeColumns {
   const Observations& o_;
   Vector3 centre_m_ = Vector3::Zero();
   double last_segment_ = 1.0;
-  std::vector<AxisTravel> direction_;  ///< by leg or position
+  std::vector<AxisTravel> direction_;  ///< direction of travel of each leg or position
 };
 
 }  // namespace abbe::calib::otf

@@ -182,7 +182,8 @@ Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit,
 Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& solution,
                                                 Result<ParameterLayout> layout, Cause cause,
                                                 std::string text, const Options& options) {
-  constexpr std::size_t kMostUnknowns = 800;  // the adjustment then takes one second
+  constexpr std::size_t kMostUnknowns = 800;  // with more unknowns an adjustment takes longer than
+                                              // one second
   Result<TableBasis> basis = std::move(layout).and_then(
       [&](ParameterLayout l) { return TableBasis::of(std::move(l), fit.o.basis.options()); });
   if (!basis || basis->size() > kMostUnknowns) {

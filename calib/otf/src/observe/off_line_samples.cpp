@@ -11,7 +11,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-constexpr std::size_t kAcross = 2;  // components along a2 and a3
+constexpr std::size_t kAcross = 2;  // number of components: along a2 and a3
 using Across = std::array<double, kAcross>;
 
 /// A point relative to a leg: distance along it, and components across it in units of the stated

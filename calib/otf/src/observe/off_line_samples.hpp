@@ -10,7 +10,7 @@
 namespace abbe::calib::otf {
 
 struct OffLine {
-  std::vector<std::size_t> samples;  ///< indices, ascending
+  std::vector<std::size_t> samples;  ///< indices of the samples, ascending
   struct Noisy {
     std::size_t segment = 0;
     double noise_factor = 1.0;

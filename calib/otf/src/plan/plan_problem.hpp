@@ -21,7 +21,8 @@ struct Leg {
 
 /// The two whitened rows of one point, along a2 and a3; both have the same columns.
 struct PointRows {
-  static constexpr std::size_t kCapacity = DesignColumns::kCapacity + 1;  // range offset
+  // one more column, for the range offset
+  static constexpr std::size_t kCapacity = DesignColumns::kCapacity + 1;
   std::array<Eigen::Index, kCapacity> column;
   std::array<double, kCapacity> along_a2, along_a3;
   std::size_t count = 0;
@@ -29,9 +30,9 @@ struct PointRows {
 
 /// A path, represented by its information H.
 struct PathState {
-  Eigen::MatrixXd H;      ///< lower triangle
-  double value_m2 = 0.0;  ///< trace(G C)
-  Eigen::MatrixXd C;      ///< H^-1; set only by with_slope()
+  Eigen::MatrixXd H;      ///< information, lower triangle
+  double value_m2 = 0.0;  ///< the value trace(G C), in m^2
+  Eigen::MatrixXd C;      ///< the inverse of H; set only by with_slope()
   /// C G C, the derivative of -value with respect to H: the information A^T A of a short leg
   /// decreases the value by trace(A^T A D). Set only by with_slope().
   Eigen::MatrixXd D;

@@ -13,7 +13,7 @@ namespace abbe::calib::otf {
 struct RelaxedDesign {
   Eigen::MatrixXd H_per_m;  ///< information for each metre of path, lower triangle
   double mean_leg_m = 0.0;  ///< mean length of its legs
-  double value_m2 = 0.0;    ///< trace(G C)
+  double value_m2 = 0.0;    ///< trace(G C) of the optimum, in m^2
 };
 
 /// Computes the design by the multiplicative algorithm: the weight of each leg is multiplied by a

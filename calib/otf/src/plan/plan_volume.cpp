@@ -12,7 +12,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-constexpr std::size_t kVolumeCells = 12;  // per axis
+constexpr std::size_t kVolumeCells = 12;  // cells per axis
 using RigidColumns = Eigen::Matrix<double, 3, 6>;
 
 RigidColumns rigid_columns(const Vector3& from_centre_m) {

@@ -42,7 +42,7 @@ std::vector<std::vector<Eigen::Index>> rows_of_tables(const AboutBends& about,
 /// Estimate of a bend, divided by its standard deviation under the prior; nullopt if the data
 /// hardly determine the bend.
 std::optional<double> times_sigma(const BendPosterior& p, Eigen::Index i) {
-  constexpr double kLeast = 1e-3;  // share of the variance
+  constexpr double kLeast = 1e-3;  // least share of the variance that the data explain
   const double variance = 1.0 - p.Q(i, i);
   return variance > kLeast ? std::optional(std::abs(p.mean(i)) / std::sqrt(variance))
                            : std::nullopt;
@@ -168,7 +168,7 @@ void join_sharp_bends(Smoothness& s, const AboutBends& about) {
     const auto is_of_table = [&](const auto& b) { return b.motion == bend.motion; };
     const auto sharp = std::count_if(s.sharp.begin(), s.sharp.end(), is_of_table),
                all = std::count_if(about.bends.begin(), about.bends.end(), is_of_table);
-    constexpr std::ptrdiff_t kFew = 4;  // two steps
+    constexpr std::ptrdiff_t kFew = 4;  // bends of two steps
     if (sharp > kFew && static_cast<double>(sharp) > kMany * static_cast<double>(all)) {
       std::erase_if(s.sharp, is_of_table);
       s.rough_tables.push_back(bend.motion);

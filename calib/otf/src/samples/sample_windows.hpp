@@ -11,8 +11,8 @@
 namespace abbe::calib::otf {
 
 struct SampleTimes {
-  std::vector<double> time_s;  ///< of each sample
-  double period_s = 0.0;       ///< between two samples
+  std::vector<double> time_s;  ///< time of each sample
+  double period_s = 0.0;       ///< time between two samples
 };
 /// Returns the times of the samples. In some streams all samples of a burst have the time of its
 /// delivery, so that the steps within a burst are much shorter than the mean step. Such times are

@@ -8,7 +8,8 @@ namespace {
 
 constexpr double kLeastReach_m = 1e-3;
 constexpr double kFaster = 3.0;          // factor of the usual travel per sample
-constexpr double kMostVariation = 10.0;  // of the travel per sample within a run
+constexpr double kMostVariation = 10.0;  // largest accepted variation of the travel per sample
+                                         // within a run
 constexpr std::size_t kNeighbours = 8;
 
 double quantile_of(std::vector<double> values, double share) {

@@ -77,7 +77,7 @@ double least_node_distance_m(const Observations& o) {
 /// about U, and take a third of the time.
 double group_m(const Observations& o) {
   constexpr double kLongestGroup_m = 25e-3, kOfNodeDistance = 0.5;
-  constexpr std::size_t kEnoughRows = 10;  // per unknown
+  constexpr std::size_t kEnoughRows = 10;  // rows per unknown
   return o.rows.size() > kEnoughRows * o.unknowns()
              ? std::min(kLongestGroup_m, kOfNodeDistance * least_node_distance_m(o))
              : 0.0;
@@ -194,7 +194,7 @@ class AboutUnknowns {
   const Observations& o_;
   GroupedSeries groups_;
   Eigen::MatrixXd K_;
-  RowMatrix rows_;  ///< [A | residual]
+  RowMatrix rows_;  ///< rows [A | residual]
   Eigen::VectorXd scale_;
 };
 

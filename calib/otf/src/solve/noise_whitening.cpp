@@ -15,7 +15,7 @@ class Covariance {
  public:
   explicit Covariance(std::size_t n) : n_(n) {
     for (std::size_t s = 0; s < n; ++s) {
-      xx_[s][s] = 1.0;  // stationary
+      xx_[s][s] = 1.0;  // the process is stationary
     }
   }
 

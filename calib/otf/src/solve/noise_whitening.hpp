@@ -14,7 +14,7 @@ namespace abbe::calib::otf {
 
 /// Slow noise, divided by the white noise of the rows.
 struct SlowNoise {
-  std::array<double, kNoiseSources> variance{};  ///< m^2 or rad^2
+  std::array<double, kNoiseSources> variance{};  ///< in m^2 or rad^2
   double correlation_time = 1.0;
 };
 
@@ -51,8 +51,8 @@ class NoiseWhitening {
   };
 
   const NoiseSeries& series_;
-  std::vector<Prediction> predictions_;  ///< by segment
-  std::vector<Gain> gains_;              ///< by row
+  std::vector<Prediction> predictions_;  ///< one for each segment
+  std::vector<Gain> gains_;              ///< one for each row
   std::vector<double> log_variance_;
   double mean_variance_ = 1.0;
 };

@@ -51,7 +51,7 @@ Vector6d of(const Vector3& c) {
 /// has a standard deviation of sqrt(2) times its expectation.
 std::optional<Matrix3> covariance_of(std::span<const Difference> all) {
   constexpr int kRounds = 10;
-  constexpr double kLeast = 0.01, kDetermined = 1e-3;  // relative
+  constexpr double kLeast = 0.01, kDetermined = 1e-3;  // relative limits
   double mean_m2 = 0.0;
   for (const Difference& d : all) {
     mean_m2 += d.d_m * d.d_m / static_cast<double>(all.size());

@@ -50,7 +50,7 @@ class RepeatedResiduals {
     Eigen::VectorXd b;
     Eigen::MatrixXd n;
     std::vector<std::size_t> unknowns;   ///< unknowns to which the columns of B belong
-    std::vector<double> B;               ///< column by column
+    std::vector<double> B;               ///< values of B, column by column
     std::vector<std::size_t> column_of;  ///< by unknown: number of its column from 1; 0: no column
 
     /// The column of B that belongs to an unknown; it is added if it does not exist.

@@ -34,8 +34,8 @@ struct Hypothesis {
 struct Problem {
   std::span<const Standstill> standstills;
   const Vector3& target_offset_m;
-  std::vector<Vector3> measured_m;  ///< tracker frame
-  std::vector<Vector3> nominal_m;   ///< axis positions
+  std::vector<Vector3> measured_m;  ///< positions of the standstills, tracker frame
+  std::vector<Vector3> nominal_m;   ///< nominal axis positions
   double most_samples = 1.0;
 
   [[nodiscard]] std::vector<MeasuredPlace> places(const RigidTransform& T) const {

@@ -21,7 +21,7 @@ enum class ErrorCode {
 
 struct Error {
   ErrorCode code{};
-  std::string text;  ///< "attempted operation: observed result"
+  std::string text;  ///< format "attempted operation: observed result"
 };
 
 template <class T>

@@ -18,14 +18,14 @@ namespace abbe::calib::direct {
 /// One measured value. `forward`: the axis moved towards larger positions.
 struct Reading {
   double position_m = 0.0;  ///< 0 for squareness
-  double value = 0.0;       ///< m or rad
+  double value = 0.0;       ///< measured value in m or rad
   int run = 1;
   bool forward = true;
 };
 
 /// All values of one error motion or of one squareness error.
 struct MeasuredError {
-  std::string name;  ///< "EXX" to "ECZ", "EA0Z", "EB0Z", "EC0Y"
+  std::string name;  ///< one of "EXX" to "ECZ", "EA0Z", "EB0Z", "EC0Y"
   std::vector<Reading> readings;
   /// Positions of the other two axes during the measurement, for which the functional point of the
   /// device has the tool offset of the model. The component of the moving axis has no effect. A
@@ -42,7 +42,7 @@ inline constexpr double kSameTarget_m = 10e-6;
 
 /// The runs of one error at the positions that all of them have.
 struct Runs {
-  std::vector<double> positions_m;      ///< of the common targets, ascending
+  std::vector<double> positions_m;      ///< positions of the common targets, ascending
   std::vector<Eigen::VectorXd> values;  ///< one vector per run: mean of the directions of the run
   /// One vector per run: forward minus backward ([ISO 230-2] reversal error). Empty if the runs
   /// have one direction only.

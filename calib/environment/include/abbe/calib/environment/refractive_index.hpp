@@ -14,7 +14,7 @@ enum class IndexEquation { Ciddor, Edlen, ShopFloor };
 struct Air {
   double temperature_K = 293.15;
   double pressure_Pa = 101325.0;
-  double relative_humidity = 0.5;  ///< 0 to 1
+  double relative_humidity = 0.5;  ///< from 0 (dry) to 1 (saturated)
   double co2_ppm = 450.0;
   double u_temperature_K = 0.0;
   double u_pressure_Pa = 0.0;

@@ -5,7 +5,8 @@
 
 namespace abbe::calib {
 
-inline constexpr double kReferenceTemperature_K = 293.15;  ///< [ISO 1]
+inline constexpr double kReferenceTemperature_K = 293.15;  ///< 20 C, the reference temperature of
+                                                           ///< [ISO 1]
 
 /// Coefficient of linear thermal expansion with its standard uncertainty.
 struct Expansivity {

@@ -70,7 +70,7 @@ class Information {
   void add_dense(double* rows, std::size_t count);
 
   std::size_t unknowns_ = 0, rows_ = 0;
-  std::vector<double> values_;  ///< [R | z] by rows
+  std::vector<double> values_;  ///< the matrix [R | z], stored by rows
   double rest_ = 0.0;
 };
 

@@ -131,7 +131,7 @@ struct ExportLoss {
 /// Effect of one error of the model on V in the volume, and the part of it that tables of the given
 /// motions cannot hold.
 struct ErrorLoss {
-  std::string name;  ///< "EAX", "EC0Y"
+  std::string name;  ///< such as "EAX", "EC0Y"
   double rms_m = 0.0, rms_lost_m = 0.0, max_lost_m = 0.0;
 };
 /// Returns one entry for each error that has an effect. Empty for a model of polynomials, because

@@ -12,7 +12,7 @@ namespace abbe::calib::fit {
 
 /// Lengths in the unit of the points.
 struct Plane {
-  Vector3 point = Vector3::Zero();  ///< centroid
+  Vector3 point = Vector3::Zero();  ///< centroid of the points
   Vector3 normal = Vector3::UnitZ();
   Matrix3 cov_normal =
       Matrix3::Zero();    ///< rank 2: zero along the normal itself; all zero for 3 points

@@ -92,7 +92,7 @@ class AxisInterpolation {
  private:
   std::vector<double> nodes_m_;
   Interpolation kind_ = Interpolation::Linear;
-  std::vector<double> curvature_;  ///< M by rows; empty: linear
+  std::vector<double> curvature_;  ///< the matrix M by rows; empty for linear interpolation
 };
 
 }  // namespace abbe::calib

@@ -38,7 +38,8 @@ class EquivalentModel {
 
   [[nodiscard]] const KinematicChain& chain() const { return chain_; }
   [[nodiscard]] int order() const { return order_; }
-  [[nodiscard]] std::size_t size() const { return names_.size(); }  ///< 14 (order + 1) - 11
+  /// 14 (order + 1) - 11 combinations
+  [[nodiscard]] std::size_t size() const { return names_.size(); }
   [[nodiscard]] std::span<const std::string> names() const { return names_; }
   [[nodiscard]] const Eigen::MatrixXd& W() const { return W_; }
   [[nodiscard]] std::span<const PolynomialShare> shares(std::size_t column) const {

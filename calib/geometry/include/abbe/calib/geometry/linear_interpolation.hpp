@@ -13,7 +13,7 @@ namespace abbe::calib {
 
 // Names of the interpolations of tables in configurations, files and messages.
 inline constexpr std::string_view kLinearBasis = "linear";
-inline constexpr std::string_view kCubicBasis = "cubic";  ///< natural cubic
+inline constexpr std::string_view kCubicBasis = "cubic";  ///< natural cubic spline
 inline constexpr std::string_view kNotAKnotCubicBasis = "not-a-knot-cubic";
 
 /// Value f of a table at position q, U: values of the table at its nodes,

@@ -11,7 +11,7 @@
 namespace abbe::calib {
 
 struct HalfSpace {
-  Vector3 outward;  ///< unit length
+  Vector3 outward;  ///< outward normal of unit length
   double offset_m;  ///< a point p is inside if outward . p <= offset_m
 };
 
@@ -24,7 +24,7 @@ class ValidityVolume {
   /// nominal end of the travel.
   static constexpr double kTolerance_m = 1e-6;
 
-  ValidityVolume() = default;  ///< contains nothing
+  ValidityVolume() = default;  ///< a volume that contains no point
   /// Hull of at least 4 points that are not in one plane, else DegenerateGeometry. Points within
   /// 1 nm of the hull of the other points are not vertices; points inside a face or an edge are
   /// therefore left out. 5,000 vertices take 0.1 s.

@@ -92,7 +92,7 @@ struct PairTest {
                                           ///< significantly, at most 3
 };
 
-inline constexpr const char* kLength = "length";  ///< DirectedTest::direction
+inline constexpr const char* kLength = "length";  ///< a value of DirectedTest::direction
 
 /// Test whether one part differs from all others in one direction.
 struct DirectedTest {

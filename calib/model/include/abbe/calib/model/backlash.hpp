@@ -25,7 +25,7 @@ inline constexpr double kUOfBacklash = 100e-6;
 struct Backlash {
   ErrorMotion motion;
   std::optional<double> position_m{};  ///< position of the node; nullopt for one value per table
-  double value = 0.0;                  ///< m or rad
+  double value = 0.0;                  ///< difference in m or rad
   double u = 0.0;                      ///< standard uncertainty; includes the variance factor
   bool determined = false;             ///< false: only the prior determines the value
 };

@@ -45,7 +45,7 @@ namespace abbe::calib {
 /// Process noise of one table or squareness error; replaces the process noise for all.
 struct TableNoise {
   std::string table;          ///< such as "EXX", "EC0Y"
-  double per_root_day = 0.0;  ///< m or rad
+  double per_root_day = 0.0;  ///< as length_m_per_root_day or angle_rad_per_root_day
 };
 
 struct UpdateOptions {

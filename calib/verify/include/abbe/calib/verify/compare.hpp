@@ -36,10 +36,10 @@ struct Options {
 
 struct GridPoint {
   Vector3 q_m = Vector3::Zero();
-  Vector3 V_las_m = Vector3::Zero();      ///< relative to the origin
+  Vector3 V_las_m = Vector3::Zero();      ///< measured error relative to the origin
   Vector3 stated_m = Vector3::Zero();     ///< V of the model, relative to the origin
   Vector3 turned_m = Vector3::Zero();     ///< stated_m after the rigid motion of the model
-  double R_stated = 0.0, R_turned = 0.0;  ///< R_resmag
+  double R_stated = 0.0, R_turned = 0.0;  ///< the ratio R_resmag of both
 };
 
 /// Statistics of R_resmag as in [Li OMM] Table 4: percentiles are interpolated between order

@@ -23,8 +23,8 @@
 namespace abbe::calib::verify {
 
 struct MeasuredPoint {
-  Vector3 reading_m = Vector3::Zero();   ///< axis positions
-  Vector3 measured_m = Vector3::Zero();  ///< in the instrument's frame
+  Vector3 reading_m = Vector3::Zero();   ///< axis positions from the scales
+  Vector3 measured_m = Vector3::Zero();  ///< measured point in the instrument's frame
 };
 
 /// Transformation of the measured points to machine coordinates.
@@ -38,7 +38,7 @@ struct Observations {
   Frame frame = Frame::BestFit;
   RigidTransform T_machine_tracker;
   std::vector<Vector3> readings_m;              ///< means of the shots
-  std::vector<Vector3> measured_m;              ///< means, in the instrument's frame
+  std::vector<Vector3> measured_m;              ///< means of the shots, in the instrument's frame
   std::vector<Vector3> V_m;                     ///< V of each place: T measured - reading
   std::vector<std::vector<std::size_t>> shots;  ///< indices of the measured points of each place
   /// Standard deviation of a shot from the mean of its place (length of the vector), pooled over

@@ -9,7 +9,7 @@
 namespace abbe::calib::direct {
 
 struct Scatter {
-  double variance = 0.0;  // of one value of one run, in m^2 or rad^2
+  double variance = 0.0;  // variance of one value of one run, in m^2 or rad^2
   std::size_t dof = 0;    // degrees of freedom; 0: the scatter is not known
 };
 /// The scatter is not known (dof 0) for one run, and if all runs have the same values. For a

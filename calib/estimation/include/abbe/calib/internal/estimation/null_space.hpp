@@ -11,7 +11,7 @@ namespace abbe::calib::estimation {
 
 /// Singular values of the R of an Information, with columns scaled to unit length.
 struct Spectrum {
-  Eigen::VectorXd singular_values;  ///< descending
+  Eigen::VectorXd singular_values;  ///< in descending order
   std::size_t rank = 0;             ///< number of singular values above the threshold
   /// Smaller singular values count as zero. Rounding changes a singular value by at most
   ///     n sqrt(rows) eps times the largest singular value,
@@ -31,7 +31,7 @@ struct Spectrum {
 
 /// Combinations of the unknowns that the data do not determine.
 struct NullSpace {
-  std::size_t rank = 0;   ///< pivoted_rank()
+  std::size_t rank = 0;   ///< as returned by pivoted_rank()
   Eigen::MatrixXd basis;  ///< unknowns() x datum defect, in the units of the unknowns
   /// for each column-scaled unknown: 0 if the data determine it, 1 if the data contain nothing
   /// about it

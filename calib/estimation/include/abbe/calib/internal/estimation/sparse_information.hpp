@@ -13,7 +13,7 @@ namespace abbe::calib::estimation {
 
 /// A row of A with its y, and 1 / standard deviation of y.
 struct WeightedRow {
-  std::span<const RowEntry> entries;  ///< columns ascend
+  std::span<const RowEntry> entries;  ///< non-zero entries; columns in ascending order
   double y = 0.0;
   double root_weight = 1.0;
 };

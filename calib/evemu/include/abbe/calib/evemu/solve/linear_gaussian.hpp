@@ -35,7 +35,7 @@ class LinearGaussian {
     /// search for the maximum away from such priors.
     double log_likelihood = 0.0;
     Eigen::VectorXd by_log_prior;  ///< derivative by the logarithm of each column's prior variance
-    double by_log_noise = 0.0;     ///< derivative by log s^2
+    double by_log_noise = 0.0;     ///< derivative of log_likelihood by log s^2
   };
   /// `prior`: variance of every column of [X S]; may contain zeros.
   [[nodiscard]] Evidence evidence(const Eigen::VectorXd& prior, double noise_variance) const;

@@ -33,10 +33,10 @@ enum class PriorKind { Ridge, BayesPose };
 
 struct HyperParameters {
   double s_d_m = 1e-3;    ///< translations; for ridge: t, of all coefficients except the constants
-  double rho = 0.5;       ///< decay per order
-  double s_a_m = 0.5e-3;  ///< rotations at the largest half width
+  double rho = 0.5;       ///< decay of the prior per order
+  double s_a_m = 0.5e-3;  ///< standard deviation of rotations at the largest half width
   double s_m = 5e-6;      ///< noise of a ball centre, per coordinate
-  double w_rad = 1e-4;    ///< pose rotations, per axis
+  double w_rad = 1e-4;    ///< standard deviation of pose rotations, per axis
   double log_likelihood = 0.0;
   int evaluations = 0;
 };

@@ -100,7 +100,7 @@ struct SolveOptions {
 };
 
 struct ResidualFigures {
-  double mean_abs_m = 0.0;  ///< mean absolute component
+  double mean_abs_m = 0.0;  ///< mean absolute value of a component
   double rms_m = 0.0;
   double max_abs_m = 0.0;
 };
@@ -117,7 +117,8 @@ struct Statistics {
   double s_m = 0.0;                   ///< noise of a ball centre per coordinate
   double w_rad = 0.0;                 ///< random pose rotation per axis; 0 where not estimated
   double slow_noise_m = 0.0;          ///< slow noise per coordinate, in addition to s_m (noise.hpp)
-  double chi2_per_dof = 0.0;          ///< chi-square of whitened residuals / s; 0 without s
+  double chi2_per_dof = 0.0;          ///< chi-square per degree of freedom of the whitened
+                                      ///< residuals / s; 0 without s
   ResidualFigures before, after;
   int iterations = 0;
   /// Largest rms difference of V over the balls between this estimate and an estimate with other

@@ -12,7 +12,7 @@ namespace abbe::calib::fit {
 
 /// Lengths in the unit of the points.
 struct Line {
-  Vector3 point = Vector3::Zero();  ///< centroid
+  Vector3 point = Vector3::Zero();  ///< centroid of the points
   Vector3 direction = Vector3::UnitX();
   /// covariance of `point` across the line and of `direction`: rank 2, zero along the line; all
   /// zero for 2 points

@@ -15,7 +15,7 @@ struct PointSet {
   Eigen::Matrix3Xd centred;  ///< one column per point, relative to the centroid
   /// principal directions of the points as columns, that of the longest extent first
   Matrix3 directions = Matrix3::Identity();
-  Vector3 singular_values = Vector3::Zero();  ///< descending
+  Vector3 singular_values = Vector3::Zero();  ///< in descending order
   double size = 0.0;                          ///< largest distance from the centroid
   std::size_t distinct = 0;
 

@@ -43,7 +43,7 @@ struct StepGauge {
   std::optional<Expansivity> expansion;
   double temperature_K = kReferenceTemperature_K, u_temperature_K = 0.0;
   Vector3 origin_m = Vector3::Zero();       ///< centre of the tip at the first face, machine axes
-  Vector3 tool_offset_m = Vector3::Zero();  ///< tool reference point to tip
+  Vector3 tool_offset_m = Vector3::Zero();  ///< from the tool reference point to the tip
   /// Standard uncertainty of the rotations of the machine along the bar, relative to hole 1.
   std::optional<double> u_rotation_rad;
   /// Standard uncertainty of each of the two angles between the gauge and the line of its touches.

@@ -48,7 +48,7 @@ struct PassObservation {
   /// Derivatives of O_i in bar axes by a displacement of each used touch along its normal: 3N x
   /// used touches.
   Eigen::MatrixXd dO_dtouch;
-  Eigen::VectorXd delta_m;  ///< 3N, bar axes
+  Eigen::VectorXd delta_m;  ///< deviations of the N points, 3N values, bar axes
 };
 
 struct Observations {

@@ -81,7 +81,7 @@ struct NominalTouch {
 ///     q/EI = 12 density g / (E h^2),   g = 9.81 m/s^2,   h: size of the section along the bending
 struct Sag {
   std::array<double, 2> beam_x_m{};      ///< ends x0 < x1 of the beam
-  std::array<double, 2> supports_m{};    ///< a < b, along x
+  std::array<double, 2> supports_m{};    ///< positions a < b of the supports along x
   std::array<double, 2> section_yz_m{};  ///< size of the section along y and z
   double density_kg_per_m3 = 0.0;
   double youngs_modulus_Pa = 0.0;

@@ -50,9 +50,9 @@ struct Budget {
   std::string name;  ///< such as "EXX"
   double u = 0.0;    ///< combined standard uncertainty; m or rad
   double probe = 0.0, machine = 0.0, bar = 0.0;
-  double expansion = 0.0;    ///< uncertainty of alpha
-  double temperature = 0.0;  ///< temperature of the bar in each position
-  double roll = 0.0;         ///< prior of the roll of the bar
+  double expansion = 0.0;    ///< caused by the uncertainty of alpha
+  double temperature = 0.0;  ///< caused by the temperature of the bar in each position
+  double roll = 0.0;         ///< caused by the prior of the roll of the bar
   /// Part of u that is caused by estimating the drift; it is contained in `probe` and `machine`. 0
   /// without pairs.
   double drift = 0.0;

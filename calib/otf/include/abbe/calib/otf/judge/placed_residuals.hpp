@@ -20,13 +20,13 @@ struct HeldOutResidual {
 struct PlacedResidual {
   /// Length of the path from its first vertex to the row [m].
   double way_m = 0.0;
-  std::size_t leg = 0;             ///< Observation::leg
-  std::optional<double> time_s{};  ///< of the row's segment, Observations::segment_s
+  std::size_t leg = 0;             ///< as Observation::leg
+  std::optional<double> time_s{};  ///< time of the row's segment, Observations::segment_s
   Vector3 axis_position_m = Vector3::Zero();
-  std::size_t component = 0;  ///< Observation::component
+  std::size_t component = 0;  ///< as Observation::component
   double sigma_m = 1.0;       ///< standard uncertainty of the row
-  double before_m = 0.0;      ///< Residuals::before_m
-  double after_m = 0.0;       ///< Residuals::after_m
+  double before_m = 0.0;      ///< as Residuals::before_m
+  double after_m = 0.0;       ///< as Residuals::after_m
   std::optional<HeldOutResidual> held_out{};
 };
 

@@ -46,7 +46,7 @@ class MomentAccumulator {
     Vector3 target_offset_m = Vector3::Zero();
     RigidTransform T_machine_tracker;
     Noise noise;              ///< noise of one sample
-    double corner_m = 0.010;  ///< Options::corner_m
+    double corner_m = 0.010;  ///< as Options::corner_m
     /// True: one more unknown after the rigid ones, the offset common to all ranges
     /// (Noise::u_range_offset_m). Its column is approximated by a quadratic function of x, with an
     /// error of (half cell / range)^3: 2e-5 of the offset for nodes 50 mm apart, 1 m from the

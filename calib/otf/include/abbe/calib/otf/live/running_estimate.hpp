@@ -50,8 +50,8 @@ struct TableSoFar {
 
 struct TablesSoFar {
   std::vector<TableSoFar> tables;         ///< in the order of the layout
-  std::array<NodeSoFar, 3> squareness{};  ///< EA0Z EB0Z EC0Y
-  std::optional<Vector6> rigid;           ///< T, r; nullopt: not determined
+  std::array<NodeSoFar, 3> squareness{};  ///< EA0Z, EB0Z, EC0Y
+  std::optional<Vector6> rigid;           ///< translation T and rotation r; nullopt: not determined
   std::size_t samples = 0;                ///< number of used samples
   double variance_factor = 1.0;
 };
@@ -63,7 +63,7 @@ class RunningEstimate {
   struct Setup {
     Machine machine;
     Noise noise;
-    double corner_m = 0.010;  ///< Options::corner_m
+    double corner_m = 0.010;  ///< as Options::corner_m
     TravelDependence backlash = TravelDependence::None;
   };
   /// Creates an estimate. Errors: those of the layout of the machine and of MomentAccumulator.

@@ -22,7 +22,7 @@ struct EncoderReading {
 struct ClockMap {
   double offset_s = 0.0;  ///< machine's clock minus tracker's clock at `origin_s`
   double drift = 0.0;     ///< relative; 1e-6: the machine's clock is fast by 1 us per second
-  double origin_s = 0.0;  ///< tracker's clock
+  double origin_s = 0.0;  ///< time of the tracker's clock
 
   [[nodiscard]] double machine_s(double tracker_s) const {
     return tracker_s + offset_s + drift * (tracker_s - origin_s);

@@ -41,16 +41,16 @@ namespace abbe::calib::otf {
 struct DriftObservations {
   std::vector<double> knots_s{};    ///< ascending, tracker clock
   std::size_t zero = 0;             ///< index of the knot at the first visit, where the drift is 0
-  std::vector<double> segment_s{};  ///< mean time by Observation::segment
+  std::vector<double> segment_s{};  ///< mean time of each segment, by Observation::segment
   std::vector<NestVisit> visits{};
   std::vector<std::string> names{};  ///< names of the nests
   double u_repeatability_m = 0.0;
   bool rotates = false;
-  double length_m = 1.0;  ///< L
+  double length_m = 1.0;  ///< mean range L
 };
 
 struct DriftPoint {
-  double time_s = 0.0;                ///< tracker clock
+  double time_s = 0.0;                ///< time of the tracker's clock
   Vector3 value_m = Vector3::Zero();  ///< apparent motion of the centre of the path, machine axes
 };
 
@@ -58,7 +58,7 @@ struct DriftPoint {
 struct TrackerDrift {
   Eigen::VectorXd coefficients;      ///< coefficients of the hat functions, without the knot at the
                                      ///< first visit
-  std::vector<DriftPoint> points{};  ///< at the knots
+  std::vector<DriftPoint> points{};  ///< one point at each knot
   std::size_t visits = 0;            ///< number of used visits
   /// Standard uncertainty with which the visits were used: root mean square over the factors of the
   /// stated repeatability.

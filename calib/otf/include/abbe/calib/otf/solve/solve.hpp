@@ -160,11 +160,11 @@ struct Solution {
   /// after_m: model, range offset, drift and errors of two axes subtracted
   Residuals residuals;
   RangeOffset range_offset;
-  std::optional<TwoAxisErrors> two_axes{};           ///< not in the model; part of its misfit
-  std::optional<Synchronisation> synchronisation{};  ///< with scale readings
-  std::vector<Backlash> backlash{};                  ///< with Options::backlash
-  std::optional<TrackerDrift> drift{};               ///< with Options::nests
-  std::optional<Smoothness> smoothness{};            ///< with Options::smoothness
+  std::optional<TwoAxisErrors> two_axes{};           ///< not part of the model, but of its misfit
+  std::optional<Synchronisation> synchronisation{};  ///< only with scale readings
+  std::vector<Backlash> backlash{};                  ///< only with Options::backlash
+  std::optional<TrackerDrift> drift{};               ///< only with Options::nests
+  std::optional<Smoothness> smoothness{};            ///< only with Options::smoothness
   /// The range offset, for combining this run with others that have the same offset. Only with
   /// Noise::u_range_offset_m and without nests (with nests it is estimated together with the
   /// drift).

@@ -15,7 +15,7 @@ struct FitProblem {
   Eigen::MatrixXd X;  ///< rows before whitening
   Eigen::VectorXd y;
   bool from_touches = false;
-  Eigen::MatrixXd A{};  ///< artefact_rows()
+  Eigen::MatrixXd A{};  ///< the matrix artefact_rows()
 };
 
 struct Fit {

@@ -18,7 +18,7 @@ struct VolumetricDesign {
   /// The polynomials of a ball array. They are valid for the tool offset they were made with.
   VolumetricDesign(const ScaledDesign&);  // NOLINT(google-explicit-constructor): it is a design
 
-  std::size_t unknowns = 0;  ///< columns of B
+  std::size_t unknowns = 0;  ///< number of columns of B
   std::function<Eigen::Matrix3Xd(const Vector3& reading_m)> B;
 };
 /// Makes the design of a basis for the tool offset of the stylus.

@@ -20,12 +20,12 @@ using RootOfNoise = Eigen::LLT<Eigen::MatrixXd>;
 struct PositionSystem {
   std::vector<std::size_t> passes;  ///< indices in Observations::passes; their rows follow each
                                     ///< other
-  std::vector<RootOfNoise> root;    ///< for each pass
+  std::vector<RootOfNoise> root;    ///< one for each pass
   NuisanceLayout layout;
   Eigen::Index rows_of_pass = 0;
-  RowMajorRows A;     ///< whitened, data only
-  Eigen::MatrixXd L;  ///< whitened, data only
-  Eigen::VectorXd y;  ///< whitened
+  RowMajorRows A;     ///< whitened rows of the data, without priors
+  Eigen::MatrixXd L;  ///< whitened rows of the data, without priors
+  Eigen::VectorXd y;  ///< whitened data
   Eigen::MatrixXd R;  ///< upper triangle
   Eigen::MatrixXd G;
   Eigen::VectorXd z;

@@ -43,9 +43,9 @@ struct EncoderLine {
 /// the clocks needs; differences of two such times do not.
 struct RunClock {
   double lag_s = 0.0;        ///< machine's clock at `origin_s`, since `log_start_s`
-  double drift = 0.0;        ///< as ClockMap::drift
-  double origin_s = 0.0;     ///< tracker's clock
-  double log_start_s = 0.0;  ///< machine's clock at the first reading
+  double drift = 0.0;        ///< relative drift, as ClockMap::drift
+  double origin_s = 0.0;     ///< time of the tracker's clock
+  double log_start_s = 0.0;  ///< time of the machine's clock at the first reading
 
   [[nodiscard]] static RunClock of(const ClockMap& map, double origin_s, double log_start_s) {
     return {map.offset_s + (origin_s - log_start_s) + map.drift * (origin_s - map.origin_s),
@@ -66,7 +66,8 @@ class EncoderLines {
 
   [[nodiscard]] double period_s() const { return period_s_; }  ///< median period of the readings
   [[nodiscard]] std::span<const EncoderReading> readings() const { return readings_; }
-  [[nodiscard]] double log_start_s() const { return log_start_s_; }  ///< machine's clock
+  /// time of the first reading, machine's clock
+  [[nodiscard]] double log_start_s() const { return log_start_s_; }
   /// The line at `at_s` from the readings between `from_s` and `to_s`. If there are fewer than two,
   /// the line through the readings before and after `at_s`. nullopt if half of the readings are
   /// missing.
@@ -108,7 +109,7 @@ class AlongRows {
   EncoderLines lines_;
   RunClock clock_;
   double sigma_factor_ = 1.0;
-  std::vector<std::size_t> left_out_;  ///< segments, ascending
+  std::vector<std::size_t> left_out_;  ///< indices of segments, ascending
 };
 
 }  // namespace abbe::calib::otf

@@ -26,7 +26,7 @@ struct TableBend {
 /// Coordinates x with U = U_of x: at the index of a bend's middle node + 1, x contains the bend; at
 /// all other indices, x contains the unknown itself.
 struct BendCoordinates {
-  Eigen::MatrixXd U_of;             ///< unknowns x unknowns
+  Eigen::MatrixXd U_of;             ///< matrix of size unknowns x unknowns
   std::vector<std::size_t> others;  ///< coordinates that are not bends, ascending
 };
 [[nodiscard]] BendCoordinates bend_coordinates(const std::vector<TableBend>&,

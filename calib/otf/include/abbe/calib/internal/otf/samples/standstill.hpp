@@ -55,9 +55,9 @@ struct Standstills {
   double speed_limit_m_per_s = 0.0;  ///< for windows without a lost sample: below this speed the
                                      ///< target stands still
   std::size_t samples = 0;
-  std::size_t lost_samples = 0;  ///< invalid samples
-  std::size_t too_short = 0;     ///< stops that are shorter than least_duration_s
-  std::size_t creeping = 0;      ///< slow motions that exceed most_creep_m
+  std::size_t lost_samples = 0;  ///< number of invalid samples
+  std::size_t too_short = 0;     ///< number of stops shorter than least_duration_s
+  std::size_t creeping = 0;      ///< number of slow motions that exceed most_creep_m
 };
 
 /// Finds the standstills. NotFinite or BadInput for samples that are not numbers or whose time does

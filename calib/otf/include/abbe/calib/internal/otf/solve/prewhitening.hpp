@@ -35,10 +35,10 @@ namespace abbe::calib::otf {
 /// Noise of the readings of the tracker with the symbols of this header. The default is white noise
 /// without slow parts.
 struct TrackerNoise {
-  double white_factor = 1.0;    ///< kappa
-  double slow_range_m = 0.0;    ///< s_r
-  double slow_angle_rad = 0.0;  ///< s_a
-  double slow_along_m = 0.0;    ///< s_t
+  double white_factor = 1.0;    ///< kappa: factor of the variance of the white noise
+  double slow_range_m = 0.0;    ///< s_r: slow noise of the ranges
+  double slow_angle_rad = 0.0;  ///< s_a: slow noise of the angles
+  double slow_along_m = 0.0;    ///< s_t: slow noise of the scale readings
   /// tau in s; for segments without times in units of a segment.
   double correlation_time = 0.0;
 };

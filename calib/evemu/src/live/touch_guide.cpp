@@ -306,7 +306,7 @@ void TouchGuide::accept_ball(std::size_t feature, GuidedTouch& out) {
                                         " on no ball, as ", name(feature_at(feature)),
                                         " shows where all balls are: discarded"));
   for (std::size_t f = feature + 1; f < passed_.size(); ++f) {
-    if (!has_enough(f)) passed_[f] = false;  // it was skipped only by a stray touch
+    if (!has_enough(f)) passed_[f] = false;  // only a stray touch had skipped the feature
   }
 }
 

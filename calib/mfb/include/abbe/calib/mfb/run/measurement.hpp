@@ -48,7 +48,7 @@ inline constexpr double kMostBetweenPositions_K = 1.0;
 
 /// Standard uncertainties (k = 1).
 struct TouchNoise {
-  double probe_m = 0.0;          ///< of one touch, along the normal of the surface
+  double probe_m = 0.0;          ///< of one touch of the probe, along the surface normal
   double machine_m = 0.0;        ///< of one touch, in each machine axis (repeatability)
   double u_temperature_K = 0.0;  ///< of temperature_K; one error per position
   /// Standard uncertainty of the error of temperature_K that is common to all positions: that of

@@ -231,7 +231,7 @@ void Quickhull::add_triangle(Index a, Index b, Index c) {
   triangles_.push_back(std::move(t));
 }
 
-/// Assigns every point to the first triangle, from `first_triangle` on, above which the point lies by
+/// Assigns every point to the first triangle, from `first_triangle` on, above which it lies by
 /// more than the tolerance.
 void Quickhull::assign(const std::vector<Index>& points, Index first_triangle) {
   for (const Index p : points) {

@@ -48,8 +48,8 @@ Eigen::MatrixXd drawn_from(const Eigen::MatrixXd& covariance) {
   return factors.transpositionsP().transpose() * z;
 }
 
-/// The volume is divided into at most this number of cells along each axis. The misfit of V is one
-/// value in a cell.
+/// The volume is divided into at most this number of cells along each axis. The misfit of V is
+/// constant within a cell.
 constexpr int kMostCells = 5;
 
 /// True if the coefficients are only rounding errors. Coefficients are 1 for translations and

@@ -17,7 +17,7 @@ struct OffLine {
   };
   std::vector<Noisy> segments;
 };
-/// Finds the samples. `series`: the segments of `samples`.
+/// Finds the samples off the line through their neighbours. `series`: the segments of `samples`.
 [[nodiscard]] OffLine off_line_samples(std::span<const TrackerObservation> samples,
                                        const SegmentSeries& series, const Alignment&,
                                        const Vector3& target_offset_m, const Path&, const Noise&);

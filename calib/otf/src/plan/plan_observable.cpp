@@ -128,7 +128,7 @@ std::string listed(const std::vector<std::string>& names) {
 
 Result<Observability> observability(const Path& path, const Machine& machine,
                                     TravelDependence backlash) {
-  Machine linear = machine;  // the rank hardly depends on the interpolation, but the time does
+  Machine linear = machine;  // linear tables save time and hardly change the rank
   linear.interpolation = Interpolation::Linear;
   Result<Observations> empty = observations_without_rows(linear, path, {}, {}, backlash);
   ABBE_TRY(empty);

@@ -146,7 +146,8 @@ Result<EvemuInput> from_files(const EvemuInputArguments& arguments) {
 }
 
 Result<EvemuInput> from_recording(const EvemuInputArguments& arguments, const Progress& progress) {
-  auto recording = open_recording(arguments.recording, arguments.machine);
+  auto recording = open_recording(arguments.recording, arguments.machine,
+                                  [&progress] { return progress.stopped(); });
   ABBE_TRY(recording);
   ABBE_TRY(require_target(recording->config.machine));
   const auto run = last_complete_run<EvemuMethod>(*recording, recording->source.name,

@@ -59,7 +59,8 @@ mfb::Options options_of(const IdentifyMfbArguments& arguments) {
 /// of the session does not take such touches.
 Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments,
                                     const Progress& progress) {
-  auto recording = open_recording(arguments.recording, arguments.machine);
+  auto recording = open_recording(arguments.recording, arguments.machine,
+                                  [&progress] { return progress.stopped(); });
   ABBE_TRY(recording);
   auto run = last_complete_run<MfbMethod>(*recording, arguments.recording, "calibration with a bar",
                                           progress);
@@ -175,7 +176,7 @@ Result<void> check(const IdentifyMfbArguments& arguments) {
 
 Result<MfbOutcome> identify_mfb(const IdentifyMfbArguments& arguments, const Progress& progress) {
   ABBE_TRY(check(arguments));
-  const auto input = read_input(arguments, progress);
+  auto input = read_input(arguments, progress);
   ABBE_TRY(input);
   auto candidate = identified(arguments, *input, progress);
   ABBE_TRY(candidate);

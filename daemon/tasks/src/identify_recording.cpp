@@ -85,16 +85,18 @@ Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments,
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
                                   const std::optional<ActiveDocument>& active,
                                   const Progress& progress) {
-  auto recording = open_recording(arguments.recording, arguments.machine);
+  const auto stopped = [&progress] { return progress.stopped(); };
+  auto recording = open_recording(arguments.recording, arguments.machine, stopped);
   ABBE_TRY(recording);
   apply(arguments, recording->config);
   ABBE_TRY(apply_smoothness(arguments.smoothness, recording->config));
   ABBE_TRY(require_target(recording->config.machine));
   const auto other = comparison_model(active, recording->config);
-  auto replayed = replay(recording->reader, recording->config,
-                         {.active = other.model, .progress = [&progress](double share) {
-                            progress.show("replaying", share);
-                          }});
+  auto replayed =
+      replay(recording->reader, recording->config,
+             {.active = other.model,
+              .progress = [&progress](double share) { progress.show("replaying", share); },
+              .stopped = stopped});
   ABBE_TRY(replayed);
   auto recorded = last_complete_run(std::move(*replayed), arguments.recording);
   ABBE_TRY(recorded);

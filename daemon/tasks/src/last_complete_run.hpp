@@ -29,6 +29,7 @@ template <class Method>
   const auto replayed =
       replay(recording.reader, recording.config,
              {.progress = [&progress](double share) { progress.show("replaying", share); },
+              .stopped = [&progress] { return progress.stopped(); },
               .runs =
                   [&last](CalibrationRun run) {
                     if (auto* of_method = std::get_if<Run>(&run)) last = std::move(*of_method);

@@ -27,9 +27,10 @@ std::string present_name(const std::string& file) {
 
 }  // namespace
 
-Result<OpenedRecording> open_recording(const std::string& named, const std::string& config) {
+Result<OpenedRecording> open_recording(const std::string& named, const std::string& config,
+                                       const std::function<bool()>& stopped) {
   const std::string file = present_name(named);
-  auto reader = RecordingReader::open(file);
+  auto reader = RecordingReader::open(file, stopped);
   ABBE_TRY(reader);
   const auto recorded = recorded_config(*reader, file);
   auto read = config.empty() ? recorded : load_config(config);

@@ -1,6 +1,7 @@
 #pragma once
 /// A recording, and the configuration with which it is replayed.
 
+#include <functional>
 #include <string>
 
 #include "abbe/base/error.hpp"
@@ -18,9 +19,10 @@ struct OpenedRecording {
 };
 
 /// Opens `file`. The configuration is read from the file `config`; if `config` is empty, it is the
-/// recorded one.
+/// recorded one. `stopped` as for RecordingReader::open().
 [[nodiscard]] Result<OpenedRecording> open_recording(const std::string& file,
-                                                     const std::string& config = {});
+                                                     const std::string& config = {},
+                                                     const std::function<bool()>& stopped = {});
 
 /// Sets in `config` the meaning of the readings, and whether devices are simulated, from the
 /// recorded configuration. This is necessary because the samples of a recording have the meaning

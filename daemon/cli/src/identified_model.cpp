@@ -5,12 +5,24 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
 
 #include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/config/gate_conditions.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
+
+void add_accept_option(CLI::App& command, std::vector<std::string>& accept) {
+  const auto known = gate_conditions();
+  command
+      .add_option("--accept", accept,
+                  "do not refuse the model for this condition, beside those of [gate] accept; may "
+                  "be repeated")
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(std::vector<std::string>(known.begin(), known.end())));
+}
 
 void add_pdf_option(CLI::App& command, std::string& pdf) {
   command.add_option("--pdf", pdf,

@@ -4,6 +4,7 @@
 
 #include <CLI/App.hpp>
 #include <string>
+#include <vector>
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/model/gate.hpp"
@@ -19,6 +20,9 @@ struct ResultOptions {
 };
 /// Adds --keep, --json, --out and --pdf. The variables in `options` must outlive `command`.
 void add_result_options(CLI::App& command, const ResultOptions& options);
+
+/// Adds --accept NAME, which may be repeated.
+void add_accept_option(CLI::App& command, std::vector<std::string>& accept);
 
 /// Adds --pdf FILE.
 void add_pdf_option(CLI::App& command, std::string& pdf);

@@ -234,6 +234,7 @@ void add_options(CLI::App& command, IdentifyEvemuCommand& arguments) {
       "--accept-shape-only", arguments.accept_shape_only,
       "do not refuse the model because its rotation about Ball1 is unknown; as [gate] accept =\n"
       "[\"evemu-shape-only\"]");
+  add_accept_option(command, arguments.accept);
   add_result_options(command, {arguments.keep, arguments.json, arguments.out, arguments.pdf});
 }
 

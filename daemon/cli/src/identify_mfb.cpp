@@ -91,6 +91,7 @@ void add_options(CLI::App& command, IdentifyMfbCommand& arguments) {
       ->needs(trials)
       ->capture_default_str();
   recording->excludes(add_scales_corrected(command, arguments.scales_corrected));
+  add_accept_option(command, arguments.accept);
   add_result_options(command, {arguments.keep, arguments.json, arguments.out, arguments.pdf});
 }
 

@@ -275,6 +275,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
           "--segment-samples", arguments->segment_samples,
           "samples averaged in a segment (on-the-fly); default: segments of 8.3 mm of travel")
       ->check(CLI::Range(1, 1000));
+  add_accept_option(*command, arguments->accept);
   add_result_options(*command, {arguments->keep, arguments->json, arguments->out, arguments->pdf});
 
   command->callback([arguments, &exit] { exit = run(*arguments); });

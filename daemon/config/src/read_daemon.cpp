@@ -1,11 +1,14 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 
 #include "abbe/calib/evemu/judge/judge.hpp"
 #include "abbe/calib/mfb/judge/judge.hpp"
 #include "abbe/calib/otf/observe/orientation.hpp"
 #include "abbe/calib/otf/solve/other_beams.hpp"
+#include "abbe/config/gate_conditions.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -115,17 +118,12 @@ void read_gate(ClassifiedSection& root, Config& out) {
   section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
 
   if (section.get("accept", gate.accept)) {
+    const auto known = gate_conditions();
+    const auto others = known.first(known.size() - 1);
     for (const auto& name : gate.accept)
-      if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume &&
-          name != calib::kScaleChange && name != calib::otf::kPathOrientation &&
-          name != calib::mfb::kBarTemperature && name != calib::mfb::kBarTemperatureChange &&
-          name != calib::otf::kOtherBeams)
-        section.fault(
-            "accept",
-            fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\", \"{}\", \"{}\", \"{}\" or \"{}\"",
-                        name, calib::evemu::kShapeOnly, calib::kSmallerVolume, calib::kScaleChange,
-                        calib::otf::kPathOrientation, calib::mfb::kBarTemperature,
-                        calib::mfb::kBarTemperatureChange, calib::otf::kOtherBeams));
+      if (std::ranges::find(known, name) == known.end())
+        section.fault("accept", fmt::format("\"{}\": must be \"{}\" or \"{}\"", name,
+                                            fmt::join(others, "\", \""), known.back()));
   }
 
   section.close();
@@ -139,6 +137,14 @@ void read_control(ClassifiedSection& root, const std::filesystem::path& base, Co
   section.get_maybe_empty("change_group", out.control.change_group);
   section.get_maybe_empty("move_group", out.control.move_group);
   section.close();
+}
+
+std::span<const std::string_view> gate_conditions() noexcept {
+  static constexpr std::array kConditions{
+      calib::evemu::kShapeOnly,     calib::kSmallerVolume,       calib::kScaleChange,
+      calib::otf::kPathOrientation, calib::mfb::kBarTemperature, calib::mfb::kBarTemperatureChange,
+      calib::otf::kOtherBeams};
+  return kConditions;
 }
 
 bool GateConfig::accepts(std::string_view name) const {

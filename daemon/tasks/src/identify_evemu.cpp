@@ -12,6 +12,7 @@
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/evemu/document.hpp"
 #include "abbe/result/try.hpp"
+#include "abbe/tasks/accepted_reasons.hpp"
 #include "abbe/tasks/identified_model.hpp"
 #include "argument_checks.hpp"
 
@@ -83,6 +84,7 @@ Result<EvemuOutcome> identify_evemu(const IdentifyEvemuArguments& arguments,
   ABBE_TRY(active);
   auto input = read_evemu_input(arguments.input, progress);
   ABBE_TRY(input);
+  ABBE_TRY(accept_also(arguments.accept, input->config));
   auto judging = judge_options(arguments, *input);
   ABBE_TRY(judging);
   ABBE_TRY(read_rotation_reference(arguments.input, *input));

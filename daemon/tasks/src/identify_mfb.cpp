@@ -17,6 +17,7 @@
 #include "abbe/recording/recorded_clock.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/mfb_files.hpp"
+#include "abbe/tasks/accepted_reasons.hpp"
 #include "abbe/tasks/identified_model.hpp"
 #include "abbe/tasks/scales_corrected.hpp"
 #include "argument_checks.hpp"
@@ -178,6 +179,7 @@ Result<MfbOutcome> identify_mfb(const IdentifyMfbArguments& arguments, const Pro
   ABBE_TRY(check(arguments));
   auto input = read_input(arguments, progress);
   ABBE_TRY(input);
+  ABBE_TRY(accept_also(arguments.accept, input->config));
   auto candidate = identified(arguments, *input, progress);
   ABBE_TRY(candidate);
 

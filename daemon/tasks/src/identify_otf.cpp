@@ -19,6 +19,7 @@
 #include "abbe/methods/otf/time_unit.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "abbe/tasks/accepted_reasons.hpp"
 #include "abbe/tasks/encoder_clock.hpp"
 #include "abbe/tasks/scales_corrected.hpp"
 #include "abbe/tasks/vector_option.hpp"
@@ -97,6 +98,7 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
 Result<MachineAndPath> read_machine_and_path(const IdentifyOtfArguments& arguments) {
   auto config = load_config(arguments.machine);
   ABBE_TRY(config);
+  ABBE_TRY(accept_also(arguments.accept, *config));
   auto machine = hashed_file(arguments.machine);
   ABBE_TRY(machine);
   auto path = read_path_csv(arguments.path);

@@ -9,6 +9,7 @@
 #include "abbe/recording/recorded_clock.hpp"
 #include "abbe/replay/replay.hpp"
 #include "abbe/result/try.hpp"
+#include "abbe/tasks/accepted_reasons.hpp"
 #include "abbe/tasks/identified_model.hpp"
 #include "abbe/tasks/opened_recording.hpp"
 #include "last_complete_run.hpp"
@@ -88,6 +89,7 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
   const auto stopped = [&progress] { return progress.stopped(); };
   auto recording = open_recording(arguments.recording, arguments.machine, stopped);
   ABBE_TRY(recording);
+  ABBE_TRY(accept_also(arguments.accept, recording->config));
   apply(arguments, recording->config);
   ABBE_TRY(apply_smoothness(arguments.smoothness, recording->config));
   ABBE_TRY(require_target(recording->config.machine));

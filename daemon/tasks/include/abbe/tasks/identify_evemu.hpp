@@ -19,6 +19,7 @@ struct IdentifyEvemuArguments {
   std::string keep;  ///< store with whose active model the gate compares; or empty
   std::optional<std::string> estimator, folds;  ///< default: the value of [evemu]
   bool accept_shape_only = false;
+  std::vector<std::string> accept{};  ///< see accept_also()
 };
 
 struct EvemuOutcome {

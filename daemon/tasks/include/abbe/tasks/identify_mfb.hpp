@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/mfb/identify/monte_carlo.hpp"
@@ -21,6 +22,7 @@ struct IdentifyMfbArguments {
   std::size_t trials = 0;  ///< number of Monte Carlo trials; 0: none
   std::uint64_t seed = calib::mfb::MonteCarloOptions{}.seed;
   bool scales_corrected = false;
+  std::vector<std::string> accept{};  ///< see accept_also()
 };
 
 struct MfbOutcome {

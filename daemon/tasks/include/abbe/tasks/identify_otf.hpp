@@ -27,6 +27,7 @@ struct IdentifyOtfArguments {
   std::string smoothness;                // empty: as in [otf]
   double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
+  std::vector<std::string> accept{};         // see accept_also()
   std::vector<std::string> targets;          // X,Y,Z=FILE, one per run
   std::vector<std::string> tracker_centres;  // elements of --tracker-centre-mm, "X,Y,Z"
   // default: the values of the configuration

@@ -260,6 +260,7 @@ std::string CalibrationService::identify_again() const {
 
 void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
   again_ = identify_again();
+  again_from_ = recorder_ == nullptr ? "" : recorder_->status().file.filename().string();
   again_of_ = session_.status().id;
   if (!kept && !model_) {
     session_.not_identified(kept.error(), now);
@@ -281,6 +282,12 @@ void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
   session_.judged(kept->id, verdict.accepted && !held, std::move(reason), std::move(sentences),
                   now);
   discard_model();
+}
+
+std::string CalibrationService::recording_of_run() const {
+  const SessionStatus& s = session_.status();
+  const bool ended = s.state == SessionState::Refused || s.state == SessionState::Active;
+  return ended && s.id == again_of_ ? again_from_ : "";
 }
 
 SessionStatus CalibrationService::status() const {

@@ -16,6 +16,7 @@
 
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/config/linear_axes.hpp"
+#include "abbe/model/configuration_fit.hpp"
 #include "abbe/result/try.hpp"
 #include "abbe/service/store_changes.hpp"
 #include "motion_requests.hpp"
@@ -131,9 +132,8 @@ Result<OnHub> calibrate(const HubParts& parts, const json& request) {
 /// for a stop request that waits behind it.
 constexpr std::chrono::milliseconds kStorePatience{50};
 
-/// The answer: {"id": id of the active model} if the change is done; {"change": number} while it
-/// runs. The call waits at most `patience`; during this time no other client of the control socket
-/// gets an answer.
+/// {"id": of the active model, or of the added one} if the change is done; {"change": number} while
+/// it runs. `patience`: meanwhile no other client of the control socket gets an answer.
 Result<OnHub> answer_change(StoreChanges& changes, const Result<std::uint64_t>& number,
                             std::chrono::milliseconds patience = kStorePatience) {
   ABBE_TRY(number);
@@ -160,6 +160,17 @@ Result<OnHub> activate(const HubParts& parts, const json& request) {
                             .who = who(request),
                             .why = remark_of(request.value("why", std::string{}), kLongestReason),
                             .force = request.value("force", false)}));
+}
+
+Result<OnHub> add(const HubParts& parts, const json& request) {
+  const auto changes = changes_of(parts);
+  ABBE_TRY(changes);
+  return answer_change(
+      **changes,
+      (*changes)->add({.model = request.at("model").get<std::string>(),
+                       .present = present_configuration(parts.config),
+                       .who = who(request),
+                       .why = remark_of(request.value("why", std::string{}), kLongestReason)}));
 }
 
 Result<OnHub> rollback(const HubParts& parts, const json& request) {
@@ -348,6 +359,7 @@ constexpr std::array kVerbs{
     Verb{"reference", "", Role::Change, reference},
     Verb{"sensors", "accept", Role::Change, accept_sensor},
     Verb{"activate", "", Role::Change, activate},
+    Verb{"add", "", Role::Change, add},
     Verb{"rollback", "", Role::Change, rollback},
     Verb{"change", "", Role::Look, change},
     Verb{"verification", "", Role::Look, verification},

@@ -320,6 +320,7 @@ struct SeenStatus {
   std::vector<StreamHealth> streams;
   SeenModel model;
   SessionStatus session;
+  std::string recording_of_run;  // of `session`
   std::optional<calib::HeldOutFigures> held_out;
   std::deque<SessionStatus> ended;
   protocol::Snapshot live;
@@ -346,6 +347,7 @@ SeenStatus look_at_status(const Hub& hub) {
   SeenStatus seen{.streams = hub.health(),
                   .model = SeenModel{hub.model_state()},
                   .session = parts.calibration.status(),
+                  .recording_of_run = parts.calibration.recording_of_run(),
                   .held_out = parts.calibration.session().held_out(),
                   .ended = parts.calibration.session().ended(),
                   .live = hub.live().view(),
@@ -400,6 +402,7 @@ json status_json(const SeenStatus& seen, const Config& config) {
            {"model", model_json(seen.model)},
            {"session", session_json(seen.session, seen.held_out, config.daemon.speed)},
            {"streams", std::move(devices)}};
+  if (!seen.recording_of_run.empty()) out["session"]["recording"] = seen.recording_of_run;
   json& ended = out["ended_sessions"] = json::array();
   for (const auto& session : seen.ended)
     ended.push_back(session_json(session, {}, config.daemon.speed));

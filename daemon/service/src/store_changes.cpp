@@ -40,6 +40,19 @@ Result<std::uint64_t> StoreChanges::roll_back(RollBack asked) {
   });
 }
 
+Result<std::uint64_t> StoreChanges::add(Addition asked) {
+  return begin([asked = std::move(asked)](ModelStore& store) -> Result<std::string> {
+    const auto document = parse_model(asked.model, "model");
+    ABBE_TRY(document);
+    if (!document->verdict)
+      return fail(ErrorCode::BadInput, "add: the gate has not judged this model");
+    if (const auto unfit = unfit_for(*document, asked.present, ""); !unfit.empty())
+      return fail(ErrorCode::Refused, fmt::format("add {}: {}", model_id(*document), unfit));
+    return store.add(*document, document->verdict->accepted, document->verdict->reasons,
+                     store_actor(asked.who, asked.why));
+  });
+}
+
 Result<std::uint64_t> StoreChanges::begin(Change change) {
   const std::lock_guard lock(mutex_);
   if (running_.valid() && !ready(running_))

@@ -240,6 +240,7 @@ TEST_F(HubTest, MotionAndModelChangesAreRefusedToTheLookRole) {
   EXPECT_EQ(role_of("calibrate", ""), Role::Change);
   EXPECT_EQ(role_of("cancel", ""), Role::Change);
   EXPECT_EQ(role_of("activate", ""), Role::Change);
+  EXPECT_EQ(role_of("add", ""), Role::Change);
   EXPECT_EQ(role_of("rollback", ""), Role::Change);
   EXPECT_EQ(role_of("change", ""), Role::Look);
   EXPECT_EQ(role_of("reference", "here"), Role::Change);

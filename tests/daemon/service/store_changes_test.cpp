@@ -83,6 +83,59 @@ TEST_F(StoreChangesTest, AForcedActivationNeedsAReason) {
   EXPECT_EQ(number.error().code, ErrorCode::Usage);
 }
 
+struct StoreAdditionTest : StoreChangesTest {
+  /// As another process identified it.
+  static ModelDocument judged(bool accepted) {
+    ModelDocument document = synthetic_document(3);
+    document.verdict = ModelVerdict{.accepted = accepted};
+    if (!accepted) document.verdict->reasons = {"worse than the active model"};
+    return document;
+  }
+  [[nodiscard]] Result<std::string> add(const ModelDocument& document, std::string hash) {
+    const auto number = changes_->add({.model = to_json(document),
+                                       .present = {.hash = std::move(hash)},
+                                       .who = "anna",
+                                       .why = "identified again"});
+    if (!number) return tl::unexpected(number.error());
+    return changes_->outcome(*number, 60s).value();
+  }
+};
+
+TEST_F(StoreAdditionTest, AModelIsAddedWithItsVerdictAndNotActivated) {
+  for (const bool accepted : {true, false}) {
+    const ModelDocument document = judged(accepted);
+    const auto id = add(document, document.machine_hash);
+    ASSERT_TRUE(id) << id.error().text;
+    EXPECT_EQ(*id, model_id(document));
+    const auto entries = ModelStore{folder_ / "models"}.list();
+    ASSERT_TRUE(entries);
+    EXPECT_EQ(entries->front().id, *id);
+    EXPECT_EQ(entries->front().accepted, accepted);
+    EXPECT_EQ(ModelStore{folder_ / "models"}.history()->back().actor.why, "identified again");
+    EXPECT_EQ(ModelStore{folder_ / "models"}.active_id().value(), ids_[1]);
+  }
+}
+
+TEST_F(StoreAdditionTest, AModelWithoutVerdictOrOfAnotherMachineIsNotAdded) {
+  const ModelDocument unjudged = synthetic_document(3);
+  const auto without = add(unjudged, unjudged.machine_hash);
+  ASSERT_FALSE(without);
+  EXPECT_EQ(without.error().code, ErrorCode::BadInput);
+  const auto other = add(judged(true), "another machine");
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::Refused);
+  EXPECT_EQ(ModelStore{folder_ / "models"}.list()->size(), 2u);
+}
+
+TEST_F(StoreChangesTest, ATextThatIsNoModelIsNotAdded) {
+  const auto number = changes_->add({.model = "{}", .present = {}, .who = "anna", .why = ""});
+  ASSERT_TRUE(number);
+  const auto outcome = changes_->outcome(*number, 60s);
+  ASSERT_TRUE(outcome);
+  ASSERT_FALSE(*outcome);
+  EXPECT_EQ(outcome->error().code, ErrorCode::BadInput);
+}
+
 TEST_F(StoreChangesTest, WhileAnotherProcessHasTheLockAChangeRunsAndASecondIsRefused) {
   const FileDescriptor held{::open((folder_ / "models/lock").c_str(), O_RDWR | O_CLOEXEC)};
   ASSERT_TRUE(held);

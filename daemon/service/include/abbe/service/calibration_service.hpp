@@ -85,6 +85,9 @@ class CalibrationService {
   /// CalibrationSession::status() with what the background tasks have reached: the progress of the
   /// identification, and the tables of the run so far.
   [[nodiscard]] SessionStatus status() const;
+  /// The file name of the recording with the run of the session, once it was identified, with
+  /// whatever verdict; empty before, and without a recording.
+  [[nodiscard]] std::string recording_of_run() const;
   /// The source of dates. Any thread.
   [[nodiscard]] const WallClock& clock() const noexcept { return clock_; }
 
@@ -109,13 +112,13 @@ class CalibrationService {
   WallClock clock_;
   CalibrationSession session_;
   LiveTablesWatch live_tables_;
-  std::future<Result<KeptModel>> task_;  // identifies and stores a model, or stores a model again
-  std::shared_ptr<IdentificationLink> link_;  // connection to the last identification
-  std::shared_ptr<JudgedModel> model_;  // model that must be stored; shared with the storing thread
-  // revision of the model authority at the start of storing
-  std::uint64_t revision_before_storing_ = 0;
-  std::string again_;           // the command that identifies the last identified run again
-  std::uint64_t again_of_ = 0;  // number of the session of that run
+  std::future<Result<KeptModel>> task_;        // identifies and stores, or stores again
+  std::shared_ptr<IdentificationLink> link_;   // with the last identification
+  std::shared_ptr<JudgedModel> model_;         // to be stored; shared with the storing thread
+  std::uint64_t revision_before_storing_ = 0;  // of the authority
+  std::string again_;                          // identifies the last identified run again
+  std::string again_from_;                     // the name of its recording
+  std::uint64_t again_of_ = 0;                 // the session of that run
 };
 
 }  // namespace abbe::daemon

@@ -10,6 +10,7 @@
 ///      "plan": {"file": NAME, "text": TOML}, "earlier_m": [[x, y, z], ...]}
 ///     {"do": "cancel", "who": REMARK}
 ///     {"do": "activate", "id": ID, "why": TEXT, "force": false, "who": REMARK}
+///     {"do": "add", "model": TEXT, "why": TEXT, "who": REMARK}
 ///     {"do": "rollback", "active": ID, "why": TEXT, "who": REMARK}
 ///     {"do": "change", "number": NUMBER}
 ///     {"do": "touch", "where": true}
@@ -48,14 +49,15 @@
 ///
 /// The server sets "user", the user who sends the request. The first 64 bytes of "who", if it
 /// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of
-/// "status" alone; "calibration" the "request" of the present or last session. "activate" and
-/// "rollback" change the model store, as `abbe model` does; the daemon follows the store. They
-/// return the number of the "change" and, if it is already done, the "id" of the active model;
-/// until then ask with the request "change". "rollback" is refused if a model other than "active"
-/// is active. A request that is repeated because its answer was lost therefore does not go back by
-/// another model. The calling thread reads the request and writes the answer. Hub::call() runs the
-/// part that needs the hub's thread; the duration of this part does not depend on the size of the
-/// request.
+/// "status" alone; "calibration" the "request" of the present or last session. "activate", "add"
+/// and "rollback" change the model store, as `abbe model` does; the daemon follows the store. They
+/// return the "change" and, if it is done, the "id" of the active model, or of the one that was
+/// added; until then ask with "change". "model" is the text of a model.json with the verdict of the
+/// gate; it is added with this verdict and not activated. "rollback" is refused if another model
+/// than "active" is active: a request that is repeated because its answer was lost does not go one
+/// model further back. The calling thread reads the request and writes the answer. Hub::call() runs
+/// the part that needs the hub's thread; the duration of this part does not depend on the size of
+/// the request.
 
 #include <chrono>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,7 @@
 #pragma once
-/// Changes which model of the store is active, for clients that may not write to the store. A
-/// change runs on an ordinary thread: another process may hold the store's lock, and other requests
-/// (for example a stop) must not wait for it. Only one change runs at a time. Thread-safe.
+/// Adds models to the store, and changes which one is active, for clients that may not write to it.
+/// A change runs on an ordinary thread, because the store's lock may be held by another process: a
+/// request, for example a stop, must not wait for it. One change at a time. Thread-safe.
 
 #include <chrono>
 #include <cstdint>
@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "abbe/base/error.hpp"
+#include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/model_store.hpp"
 
 namespace abbe::daemon {
@@ -29,6 +30,13 @@ struct RollBack {
   std::string who, why;  ///< kept in the store
 };
 
+/// A model that a client identified, as `abbe model add` takes it from a file.
+struct Addition {
+  std::string model;             ///< the text of model.json, with the verdict of the gate
+  PresentConfiguration present;  ///< a model of another machine is refused
+  std::string who, why;          ///< kept in the store
+};
+
 class StoreChanges {
  public:
   explicit StoreChanges(std::filesystem::path store) : store_(std::move(store)) {}
@@ -40,9 +48,13 @@ class StoreChanges {
   /// model other than `active` is active.
   [[nodiscard]] Result<std::uint64_t> roll_back(RollBack asked);
 
-  /// Waits at most `patience` for the end of the change. Returns the id of the model that is then
-  /// active, or the Error of the store; nullopt while the change runs. Usage for a number other
-  /// than that of the last change.
+  /// The same for a model that is added with its verdict, also if that is a refusal; the outcome is
+  /// its id. It is not activated. BadInput for a text that is no model, or one that the gate has
+  /// not judged; Refused for a model of another machine.
+  [[nodiscard]] Result<std::uint64_t> add(Addition asked);
+
+  /// Waits at most `patience` for the change. The id of the model that is active then, or the Error
+  /// of the store; nullopt while the change runs. Usage for another number than the last one.
   [[nodiscard]] std::optional<Result<std::string>> outcome(std::uint64_t number,
                                                            std::chrono::milliseconds patience);
 

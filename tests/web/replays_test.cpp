@@ -43,7 +43,7 @@ class ReplaysTest : public ::testing::Test {
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
-  static std::unique_ptr<Replays> replays(ReplayLimits limits = {}) {
+  static std::unique_ptr<Replays> replays(TaskLimits limits = {}) {
     return std::make_unique<Replays>(
         folder_, [](const std::string& line) { ADD_FAILURE() << line; }, limits);
   }
@@ -94,7 +94,7 @@ TEST_F(ReplaysTest, ASecondReplayIsRefusedUntilTheFirstHasEnded) {
   }
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, daemon::ErrorCode::Refused);
-  EXPECT_THAT(second.error().text, HasSubstr("another recording is being replayed"));
+  EXPECT_THAT(second.error().text, HasSubstr("another replay is running"));
   EXPECT_EQ(outcome_of(*page)["state"], "done");
   EXPECT_TRUE(page->begin(name_));
 }

@@ -3,17 +3,17 @@
 
 import { h } from "./dom.js";
 
-/** Asks before a change. `question`: {title, lines, reason, required, yes}. `reason`: the label of a
- * field for a reason; without it there is none. Returns the reason ("" without a field), or null if
- * the change is not wanted. */
-export function ask({ title, lines = [], reason = null, required = false, yes }) {
+/** Asks before a change. `question`: {title, lines, fields, reason, required, yes, no}. `fields`: elements
+ * that the caller reads itself. `reason`: the label of a field for a reason; without it there is none.
+ * Returns the reason ("" without a field), or null if the change is not wanted. */
+export function ask({ title, lines = [], fields = [], reason = null, required = false, yes, no = "Do not change" }) {
   const field = reason === null ? null : h("input", { name: "reason", maxlength: 500, required,
     pattern: required ? ".*\\S.*" : null, autocomplete: "off" });
   const form = h("form", { method: "dialog" }, h("h2", { id: "ask-title" }, title),
-    lines.map((line) => h("p", {}, line)),
+    lines.map((line) => h("p", {}, line)), fields,
     field ? h("label", {}, `${reason} `, field) : null,
     h("div", { class: "tools" }, h("button", { class: "strong", value: "yes" }, yes),
-      h("button", { value: "no", formnovalidate: true }, "Do not change")));
+      h("button", { value: "no", formnovalidate: true }, no)));
   const dialog = h("dialog", { "aria-labelledby": "ask-title", class: "ask" }, form);
   document.body.append(dialog);
   return new Promise((answer) => {

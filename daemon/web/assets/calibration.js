@@ -2,6 +2,8 @@
 
 import { ask } from "./ask.js";
 import { fixed, h, list, table } from "./dom.js";
+import { identificationView, identifyButton, mayIdentify } from "./identify.js";
+import { isSameRecording } from "./identify_options.js";
 import { get, listen, post, state } from "./server.js";
 import { message, withdraw } from "./message.js";
 import { methodInWords, running, stateInWords } from "./session_words.js";
@@ -407,9 +409,26 @@ function newCalibration() {
       h("button", { type: "button", class: "strong", onclick: begin }, "Begin")));
 }
 
+/** Below a session that has ended: identifies its run again. Returns {show, end}. */
+function againView(place) {
+  const button = h("p", { class: "tools" }), result = h("div");
+  place.append(button, result);
+  let recording = "";
+  const identification = identificationView(result, (now) => isSameRecording(now.name, recording));
+  const show = (session) => {
+    if ((session.recording ?? "") === recording) return;
+    recording = session.recording ?? "";
+    button.replaceChildren(...(recording && mayIdentify()
+      ? [identifyButton(recording, session.method, identification.follow)] : []));
+    identification.follow().catch(() => {});
+  };
+  return { show, end: identification.end };
+}
+
 export async function show(place) {
-  const parts = h("div"), view = h("div"), above = h("div"), below = h("div");
-  place.append(h("h2", {}, "Calibration"), above, parts, view, below, signalSwitch());
+  const parts = h("div"), again = h("div"), view = h("div"), above = h("div"), below = h("div");
+  place.append(h("h2", {}, "Calibration"), above, parts, again, view, below, signalSwitch());
+  const { show: showAgain, end: endAgain } = againView(again);
   let shownControls = null;
   // Cancel while a calibration runs, Begin while none does.
   const showControls = (isRunning) => {
@@ -425,6 +444,7 @@ export async function show(place) {
     if (!status) return;
     const now = status.session.state;
     showControls(running(status.session));
+    showAgain(status.session);
     // Twice a second: "warming" may lie between two.
     if (["acquiring", "identifying"].includes(now) || (before === "warming" && now !== before))
       withdraw(Object.values(begun));
@@ -451,7 +471,7 @@ export async function show(place) {
     }
   };
   await redraw();
-  const ends = [listen("status", onStatus), listen("calibration", redraw)];
+  const ends = [listen("status", onStatus), listen("calibration", redraw), endAgain];
   return () => {
     ended = true;
     ends.forEach((end) => end());

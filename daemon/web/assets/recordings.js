@@ -1,6 +1,7 @@
-// Recordings: download, replay and comparison with the live run.
+// Recordings: download, replay and comparison with the live run, identification with other options.
 
 import { bytes, facts, h, table, when } from "./dom.js";
+import { identificationView, identifyButton } from "./identify.js";
 import { message } from "./message.js";
 import { get, listen, post, state } from "./server.js";
 
@@ -26,8 +27,9 @@ function result(replay) {
 }
 
 export async function show(place) {
-  const files = h("div"), replay = h("div", { role: "status" });
-  place.append(h("h2", {}, "Recordings"), files, replay);
+  const files = h("div"), replay = h("div", { role: "status" }), again = h("div");
+  place.append(h("h2", {}, "Recordings"), files, again, replay);
+  const identification = identificationView(again);
   let timer = 0;
   const follow = async () => {
     const now = await get("api/replay");
@@ -46,16 +48,18 @@ export async function show(place) {
   const fill = async () => {
     const recordings = await get("api/recordings");
     files.replaceChildren(table("recordings",
-      ["recording", { title: "size", number: true }, "written (UTC)", "state", "replay"],
+      ["recording", { title: "size", number: true }, "written (UTC)", "state", "replay", "identify"],
       recordings.map((r) => [
         h("a", { href: `recordings/${encodeURIComponent(r.name)}`, download: r.name }, r.name),
         bytes(r.bytes), when(r.modified), r.finished ? "finished" : "being written",
-        mayReplay() ? h("button", { type: "button", "aria-label": `Replay ${r.name}`, onclick: () => begin(r.name) }, "Replay") : ""])));
+        mayReplay() ? h("button", { type: "button", "aria-label": `Replay ${r.name}`, onclick: () => begin(r.name) }, "Replay") : "",
+        mayReplay() ? identifyButton(r.name, null, identification.follow) : ""])));
   };
   await fill();
   await follow();
+  await identification.follow();
   if (!mayReplay())
-    place.append(h("p", { class: "weak" }, "To replay a recording, log in with the role calibrate."));
+    place.append(h("p", { class: "weak" }, "To replay a recording or identify it again, log in with the role calibrate."));
   const stop = listen("store", () => fill().catch((error) => message(error.message)));
-  return () => { stop(); clearTimeout(timer); };
+  return () => { stop(); clearTimeout(timer); identification.end(); };
 }

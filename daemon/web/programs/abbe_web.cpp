@@ -156,9 +156,10 @@ int serve(const std::string& file) {
   const int code = run_until_stop(stop, **page);
   abbe::daemon::notify_stopping();
   {
-    // A replay writes nothing: it can end anywhere.
+    // Neither a replay nor an identification writes anything: it can end anywhere.
     const abbe::daemon::ExitDeadline deadline(kReplayEnds, code,
-                                              "abbe-web: stopped before the end of a replay");
+                                              "abbe-web: stopped before the end of a replay or an "
+                                              "identification");
     page->reset();
   }
   log_line("stopped");

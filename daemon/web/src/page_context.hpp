@@ -11,6 +11,7 @@
 #include "abbe/web/certificate.hpp"
 #include "abbe/web/daemon_feed.hpp"
 #include "abbe/web/event_board.hpp"
+#include "abbe/web/identifications.hpp"
 #include "abbe/web/model_views.hpp"
 #include "abbe/web/page_places.hpp"
 #include "abbe/web/page_server.hpp"
@@ -32,6 +33,10 @@ struct PageContext {
                  [this](const std::string& line) { report.always(line); }),
         replays(options.settings.config.recording.dir,
                 [this](const std::string& line) { report.always(line); }),
+        identifications({.recordings = options.settings.config.recording.dir,
+                         .models = options.settings.config.daemon.models_dir(),
+                         .config_file = options.config_file},
+                        [this](const std::string& line) { report.always(line); }),
         pages(options.settings.web.most_pages),
         certificate_until(until_of(options.settings.web)),
         feed(
@@ -60,10 +65,12 @@ struct PageContext {
   ModelViews models;
   Sessions sessions;
   Replays replays;
+  Identifications identifications;
   PagePlaces pages;
   std::atomic<std::size_t> downloads{0};
   std::atomic<int> port{0};
-  std::mutex changing;  // one change of a user at a time reaches abbed
+  std::mutex changing;   // one change of a user at a time reaches abbed
+  std::mutex beginning;  // of a replay or an identification, of which one runs at a time
   std::atomic<bool> stopping{false};
   std::optional<std::chrono::sys_seconds> certificate_until;  ///< nullopt: no TLS
   DaemonFeed feed;  // last: its thread uses the members above

@@ -181,6 +181,14 @@ void answer_curves(const PageContext& context, const std::string& text,
   send_text(response, 200, std::move(*answer), "application/json");
 }
 
+/// The model of the last identification, also if it is not in the store.
+void answer_identified(const PageContext& context, httplib::Response& response) {
+  auto model = context.identifications.model();
+  if (!model) return send_error(response, 404, model.error().text);
+  response.set_header("Content-Disposition", "attachment; filename=\"model.json\"");
+  send_text(response, 200, std::move(model->text), kJson);
+}
+
 /// False if there is no such path.
 bool answer_data(PageContext& context, const httplib::Request& request,
                  httplib::Response& response) {
@@ -205,6 +213,10 @@ bool answer_data(PageContext& context, const httplib::Request& request,
     send_json(response, configuration_json(context));
   } else if (path == "/api/replay") {
     send_json(response, context.replays.status());
+  } else if (path == "/api/identify") {
+    send_json(response, context.identifications.status());
+  } else if (path == "/identified/model.json") {
+    answer_identified(context, response);
   } else if (const auto id = behind(path, "/api/models/")) {
     send_result(response, context.models.model(*id));
   } else if (const auto of_report = behind(path, "/reports/")) {

@@ -3,11 +3,13 @@
 #include <array>
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/web/client_network.hpp"
 #include "calibration_task.hpp"
 #include "lock_within.hpp"
@@ -135,24 +137,32 @@ Result<json> ask_abbed(PageContext& context, const json& request) {
   return answer;
 }
 
+/// Lets abbed make a change; the answer of abbed goes to the browser. nullopt: nothing was changed.
+std::optional<json> change(PageContext& context, const WebSession& session, json request,
+                           httplib::Response& response) {
+  request["who"] = session.user;
+  const auto what = request["do"].get<std::string>();
+  std::unique_lock<std::mutex> turn;
+  if (what != "cancel") {  // the end of a calibration waits for nothing
+    turn = lock_within(context.changing, kTurnPatience, context.stopping);
+    if (!turn) {
+      send_error(response, 503,
+                 "another change is not done yet: nothing was changed; try again in some seconds");
+      return std::nullopt;
+    }
+  }
+  auto answer = ask_abbed(context, request);
+  context.report.always(
+      fmt::format("{}: {}: {}", session.user, what, answer ? "done" : answer.error().text));
+  send_result(response, answer);
+  return answer ? std::optional{std::move(*answer)} : std::nullopt;
+}
+
 void change(PageContext& context, const WebSession& session, const Change& asked, const json& body,
             httplib::Response& response) {
   auto request = asked.request(body);
   if (!request) return send_error(response, request.error());
-  (*request)["who"] = session.user;
-  const auto what = (*request)["do"].get<std::string>();
-  std::unique_lock<std::mutex> turn;
-  if (what != "cancel") {  // the end of a calibration waits for nothing
-    turn = lock_within(context.changing, kTurnPatience, context.stopping);
-    if (!turn)
-      return send_error(response, 503,
-                        "another change is not done yet: nothing was changed; try again in some "
-                        "seconds");
-  }
-  const auto answer = ask_abbed(context, *request);
-  context.report.always(
-      fmt::format("{}: {}: {}", session.user, what, answer ? "done" : answer.error().text));
-  send_result(response, answer);
+  (void)change(context, session, std::move(*request), response);
 }
 
 /// The outcome of a request to stop the measuring machine: {"number", "outcome", "text"}.
@@ -191,10 +201,55 @@ void stop_machine(PageContext& context, const WebSession& session, httplib::Resp
 void replay(PageContext& context, const WebSession& session, const json& body,
             httplib::Response& response) {
   const auto recording = body.at("name").get<std::string>();
+  const std::lock_guard lock(context.beginning);
+  if (context.identifications.running())
+    return send_error(response, {ErrorCode::Refused, "an identification is running: wait for it"});
   if (const auto begun = context.replays.begin(recording); !begun)
     return send_error(response, begun.error());
   context.report.always(fmt::format("{}: replay of {}", session.user, recording));
   send_json(response, context.replays.status());
+}
+
+void identify(PageContext& context, const WebSession& session, const json& body,
+              httplib::Response& response) {
+  const std::lock_guard lock(context.beginning);
+  if (context.replays.running())
+    return send_error(response, {ErrorCode::Refused, "a replay is running: wait for it"});
+  if (const auto begun = context.identifications.begin(body, session.user); !begun)
+    return send_error(response, begun.error());
+  const json status = context.identifications.status();
+  context.report.always(
+      fmt::format("{}: identification of {} again", session.user, status.value("name", "")));
+  send_json(response, status);
+}
+
+void cancel_identification(PageContext& context, const WebSession& session, const json&,
+                           httplib::Response& response) {
+  if (const auto cancelled = context.identifications.cancel(session.user); !cancelled)
+    return send_error(response, cancelled.error());
+  context.report.always(fmt::format("{}: identification cancelled", session.user));
+  send_json(response, context.identifications.status());
+}
+
+/// Adds the model that was identified again to the store, as `abbe model add` does: abbed, to whom
+/// the store belongs, checks it.
+void add_identified(PageContext& context, const WebSession& session, const json& body,
+                    httplib::Response& response) {
+  const auto id = body.at("id").get<std::string>();
+  const auto model = context.identifications.model(id);
+  if (!model) return send_error(response, model.error());
+  json request{{"do", "add"}, {"model", model->text}, {"why", model->from}};
+  constexpr std::size_t kOtherMembers = 4096;
+  constexpr std::size_t kMost = daemon::kRequestBounds.bytes - kOtherMembers;
+  if (daemon::json_text(request["model"]).size() > kMost)
+    return send_error(
+        response,
+        {ErrorCode::Refused,
+         fmt::format("the model has more than {} bytes: save it as model.json, then `sudo -u abbe "
+                     "abbe model add model.json -c {}`",
+                     kMost, context.options.config_file.string())});
+  if (change(context, session, std::move(request), response))
+    context.identifications.note_added(id);
 }
 
 void refuse_role(PageContext& context, const httplib::Request& request, const WebSession& session,
@@ -207,15 +262,29 @@ void refuse_role(PageContext& context, const httplib::Request& request, const We
                          name(session.role), name(needed)));
 }
 
+/// What a user with the role calibrate may do with recorded runs.
+struct RecordedRun {
+  std::string_view path;
+  void (*answer)(PageContext&, const WebSession&, const json& body, httplib::Response&);
+};
+
+constexpr std::array kRecordedRuns{
+    RecordedRun{"/api/replay", replay},
+    RecordedRun{"/api/identify", identify},
+    RecordedRun{"/api/cancelidentification", cancel_identification},
+    RecordedRun{"/api/addidentified", add_identified},
+};
+
 /// What needs a session. `body` is a JSON object.
 void answer_change(PageContext& context, const httplib::Request& request, const WebSession& session,
                    const json& body, httplib::Response& response) {
   if (request.path == "/api/logout") return log_out(context, request, session, response);
   if (request.path == "/api/stop") return stop_machine(context, session, response);
-  if (request.path == "/api/replay") {
+  for (const RecordedRun& asked : kRecordedRuns) {
+    if (asked.path != request.path) continue;
     if (session.role < WebRole::Calibrate)
       return refuse_role(context, request, session, WebRole::Calibrate, response);
-    return replay(context, session, body, response);
+    return asked.answer(context, session, body, response);
   }
   for (const Change& asked : kChanges) {
     if (asked.path != request.path) continue;

@@ -124,6 +124,7 @@ class HttpPageServer final : public PageServer {
     context_.stopping = true;
     context_.models.stop();
     context_.replays.stop();
+    context_.identifications.stop();
     accepting_.reset();
     context_.board.close();
     server_.end_connections();

@@ -209,6 +209,9 @@ TEST_F(PageOnTheFly, IsCalibratedByClickingAndEveryViewIsRight) {
   browse("views.mjs", options);
   expect_browser_ends_well();
 
+  browse("identify.mjs", {kPassword});
+  ASSERT_NO_FATAL_FAILURE(expect_browser_ends_well());
+
   // The recording is finished when abbed ends.
   EXPECT_EQ(abbed_->stop(), 0);
   browse("replay.mjs", {kPassword});

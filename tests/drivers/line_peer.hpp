@@ -1,6 +1,6 @@
 #pragma once
-/// A program that prints tracker points as lines, on a socket of 127.0.0.1 or a pseudo terminal, in
-/// the test's own thread. Nothing happens but in the functions a test calls.
+/// A program that prints tracker points or positions of axes as lines, on a socket of 127.0.0.1 or
+/// a pseudo terminal, in the test's own thread. Nothing happens but in the functions a test calls.
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -16,7 +16,7 @@
 #include <string_view>
 #include <variant>
 
-#include "abbe/drivers/lines/tracker_device.hpp"
+#include "abbe/drivers/lines/device.hpp"
 #include "abbe/sim/pseudo_terminal.hpp"
 #include "abbe/sim/socket.hpp"
 #include "peer_socket.hpp"
@@ -30,6 +30,23 @@ inline drivers::lines::LineFormat time_x_y_z_status() {
   drivers::lines::LineFormat format;
   format.columns = {Time, X, Y, Z, Status};
   format.column_count = 5;
+  format.valid_status[0] = drivers::lines::StatusWord::from("0").value();
+  format.valid_status_count = 1;
+  return format;
+}
+
+/// The same columns with the positions of three axes, in mm.
+inline drivers::lines::ValueFormat time_axes_status() {
+  using drivers::lines::ColumnUse;
+  drivers::lines::ValueFormat format;
+  format.names = {"time", "X", "Y", "Z", "status"};
+  format.column_count = 5;
+  format.columns[0].use = ColumnUse::Time;
+  for (std::uint8_t i = 0; i < 3; ++i)
+    format.columns[1u + i] = {
+        .use = ColumnUse::Value, .value = i, .scale = 1e-3, .offset = 0.0, .limit = 100.0};
+  format.columns[4].use = ColumnUse::Status;
+  format.value_count = 3;
   format.valid_status[0] = drivers::lines::StatusWord::from("0").value();
   format.valid_status_count = 1;
   return format;

@@ -1,4 +1,4 @@
-#include "abbe/drivers/lines/tracker_device.hpp"
+#include "abbe/drivers/lines/device.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -44,26 +44,20 @@ class LineTrackerOverTcp : public testing::Test {
   }
   void take() {
     std::vector<protocol::TrackerPoint> points(1024);
-    points.resize(device_->points().pop(points));
+    points.resize(device_->samples().pop(points));
     points_.insert(points_.end(), points.begin(), points.end());
     std::vector<protocol::RawBlock> blocks(64);
     blocks.resize(device_->raw().pop(blocks));
     blocks_.insert(blocks_.end(), blocks.begin(), blocks.end());
   }
-  /// As the decoder of a recording: whole reads.
+  /// As the decoder of a recording.
   std::vector<protocol::TrackerPoint> decoded_again() {
-    auto receiver = std::make_unique<drivers::LineReceiver>(drivers::receiver_options(options()));
+    const auto recorded = std::make_unique<drivers::LineBlocks<drivers::LineReceiver>>(
+        drivers::receiver_options(options()));
     std::vector<protocol::TrackerPoint> again;
-    std::vector<std::byte> read;
-    for (const auto& block : blocks_) {
-      if (block.direction != protocol::RawBlock::Direction::FromDevice) continue;
-      read.insert(read.end(), block.bytes.begin(), block.bytes.begin() + block.length);
-      if (block.continued) continue;
-      receiver->push(read, block.time);
-      for (auto p = receiver->next(); !p.empty(); p = receiver->next())
-        again.insert(again.end(), p.begin(), p.end());
-      read.clear();
-    }
+    for (const auto& block : blocks_)
+      recorded->take(block,
+                     [&](auto points) { again.insert(again.end(), points.begin(), points.end()); });
     return again;
   }
 

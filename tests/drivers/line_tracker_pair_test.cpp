@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "abbe/drivers/lines/tracker_device.hpp"
+#include "abbe/drivers/lines/device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 #include "abbe/sim/line_tracker_server.hpp"
 #include "line_peer.hpp"
@@ -43,7 +43,7 @@ SampleErrors errors_of(const std::vector<TrackerPoint>& points, HostTime power_o
   std::array<double, 3> sum{}, squares{};
   for (const TrackerPoint& point : points) {
     if (point.head.time < power_on + kSettling) continue;
-    const auto measured = sim::host_time({}, power_on, point.device_time);
+    const auto measured = sim::host_time(sim::TrackerModel{}, power_on, point.device_time);
     ++out.count;
     out.rms_time_s += std::pow(seconds_of(point.head.time - measured), 2);
     out.mean_u_time_s += seconds_of(point.head.u_time);
@@ -63,14 +63,15 @@ SampleErrors errors_of(const std::vector<TrackerPoint>& points, HostTime power_o
   return out;
 }
 
-template <class Device, class Serve>
-SampleErrors errors_through(Device& device, SteppedTime& time, HostTime power_on, Serve serve) {
+template <class Device, class Ring, class Serve>
+SampleErrors errors_through(Device& device, Ring& points, SteppedTime& time, HostTime power_on,
+                            Serve serve) {
   std::vector<TrackerPoint> all, taken(1024);
   for (const auto end = time.now() + kDuration; time.now() < end; time.advance(kCycle)) {
     serve();
     device.wait(kCycle);
     device.receive();
-    const std::size_t n = device.points().pop(taken);
+    const std::size_t n = points.pop(taken);
     all.insert(all.end(), taken.begin(), taken.begin() + static_cast<std::ptrdiff_t>(n));
   }
   return errors_of(all, power_on);
@@ -84,7 +85,7 @@ SampleErrors errors_through_emscon() {
   options.host = "127.0.0.1";
   options.port = peer.port();
   const auto device = drivers::TrackerDevice::create(options, time).value();
-  return errors_through(*device, time, power_on, [&] {
+  return errors_through(*device, device->points(), time, power_on, [&] {
     peer.serve(time.now());
     peer.send_points();
   });
@@ -106,7 +107,8 @@ SampleErrors errors_through_lines() {
   options.receiver.format = format;
   options.receiver.time_separation = 2ms;
   const auto device = drivers::LineTrackerDevice::create(options, time).value();
-  return errors_through(*device, time, power_on, [&] { server.poll(time.now()); });
+  return errors_through(*device, device->samples(), time, power_on,
+                        [&] { server.poll(time.now()); });
 }
 
 TEST(LineTrackerPair, GivesSamplesWithTheErrorsOfEmScon) {

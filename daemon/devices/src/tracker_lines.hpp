@@ -6,7 +6,7 @@
 #include <string>
 
 #include "abbe/devices/device_kind.hpp"
-#include "abbe/drivers/lines/tracker_device.hpp"
+#include "abbe/drivers/lines/device.hpp"
 
 namespace abbe::daemon {
 

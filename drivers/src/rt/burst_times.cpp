@@ -7,7 +7,6 @@
 namespace abbe::drivers {
 
 using protocol::SampleFlag;
-using protocol::TrackerPoint;
 
 namespace {
 
@@ -20,7 +19,8 @@ constexpr std::chrono::minutes kLongestDelay{1};
 
 }  // namespace
 
-void BurstTimes::connection_began() ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::connection_began() ABBE_RT {
   clock_.reset();
   times_.reset();
   last_.reset();
@@ -28,13 +28,15 @@ void BurstTimes::connection_began() ABBE_RT {
   pending_flags_ = static_cast<protocol::SampleFlags>(SampleFlag::Restarted);
 }
 
-void BurstTimes::beam_lost() ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::beam_lost() ABBE_RT {
   if (beam_lost_) return;
   beam_lost_ = true;
   ++counters_.beam_losses;
 }
 
-void BurstTimes::assign(Points points, protocol::HostTime arrival) ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::assign(Points points, protocol::HostTime arrival) ABBE_RT {
   arrival_ = arrival;
   for (std::size_t first = 0; first < points.size();) {
     const std::size_t end = judge(points, first);
@@ -44,8 +46,9 @@ void BurstTimes::assign(Points points, protocol::HostTime arrival) ABBE_RT {
   }
 }
 
-void BurstTimes::assign_mean(TrackerPoint& point, std::chrono::nanoseconds duration,
-                             protocol::HostTime arrival) ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::assign_mean(Point& point, std::chrono::nanoseconds duration,
+                                      protocol::HostTime arrival) ABBE_RT {
   const auto delay = clock_options_.max_constant_delay;
   const double u_ns =
       std::hypot(static_cast<double>(duration.count()), static_cast<double>(delay.count())) /
@@ -57,18 +60,19 @@ void BurstTimes::assign_mean(TrackerPoint& point, std::chrono::nanoseconds durat
   mark_pending(point.head);
 }
 
-/// True if the time is ahead of the arrival. While the clock model has no observations it accepts
-/// any time; then a large step within the burst shows a wrong time.
-bool BurstTimes::is_ahead(protocol::DeviceTime t) const ABBE_RT {
+/// Without observations the clock model accepts any time: then a large step within the burst shows
+/// it.
+template <class Point>
+bool BurstTimesOf<Point>::is_ahead(protocol::DeviceTime t) const ABBE_RT {
   if (clock_.is_ahead(t, arrival_)) return true;
   return !clock_.has_observations() && times_.known() &&
          t - times_.last() > DeviceTimeCheck::kLargestStep;
 }
 
 /// Judges the points from `first` on, up to the first one on a new time base; returns its index, or
-/// the number of points. The points that were refused before the new base was certain also belong
-/// to the new base.
-std::size_t BurstTimes::judge(Points points, std::size_t first) ABBE_RT {
+/// the number of points. The points that were refused until the new base was certain belong to it.
+template <class Point>
+std::size_t BurstTimesOf<Point>::judge(Points points, std::size_t first) ABBE_RT {
   for (std::size_t k = first; k < points.size(); ++k) {
     const auto t = points[k].device_time;
     verdicts_[k] = times_.judge(t, is_ahead(t));
@@ -83,7 +87,8 @@ std::size_t BurstTimes::judge(Points points, std::size_t first) ABBE_RT {
 }
 
 /// The tracker's clock has jumped: a new clock model begins with the next point.
-void BurstTimes::begin_time_base() ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::begin_time_base() ABBE_RT {
   times_.reset();
   clock_.restart();
   last_.reset();
@@ -92,7 +97,8 @@ void BurstTimes::begin_time_base() ABBE_RT {
 }
 
 /// Converts points of one time base. The last one that was not refused updates the clock model.
-void BurstTimes::convert(Points points, std::size_t first, std::size_t end) ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::convert(Points points, std::size_t first, std::size_t end) ABBE_RT {
   for (std::size_t k = end; k-- > first;) {
     if (verdicts_[k] != Verdict::Follows) continue;
     if (clock_.observe(points[k].device_time, arrival_) == ClockModel::Observed::Restarted) {
@@ -113,16 +119,18 @@ void BurstTimes::convert(Points points, std::size_t first, std::size_t end) ABBE
   }
 }
 
-void BurstTimes::set_time(TrackerPoint& point) const ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::set_time(Point& point) const ABBE_RT {
   const HostInstant instant = clock_.to_host(point.device_time);
   point.head.time = instant.time;
   point.head.u_time = instant.u_time;
   if (!instant.settled) point.head.flags |= SampleFlag::ClockUnsettled;
 }
 
-/// Handles a point whose time does not fit those of the others. Its instant is not known. It gets
-/// its arrival time, so that its time is neither in the future nor hours ago.
-void BurstTimes::refuse(TrackerPoint& point) ABBE_RT {
+/// The time of the point does not fit those of the others. Its instant is then not known: it gets
+/// its arrival, so that it does not lie in the future or hours ago.
+template <class Point>
+void BurstTimesOf<Point>::refuse(Point& point) ABBE_RT {
   ++counters_.time_disorder;
   point.head.flags |= SampleFlag::PointInvalid;
   const auto early = arrival_ - point.head.time;
@@ -133,12 +141,14 @@ void BurstTimes::refuse(TrackerPoint& point) ABBE_RT {
 
 /// Compares the point with the previous one: a gap in the device time means lost points or a lost
 /// beam.
-void BurstTimes::follow(TrackerPoint& point) ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::follow(Point& point) ABBE_RT {
   if (last_) mark_hole(point.device_time - *last_, point);
   last_ = point.device_time;
 }
 
-void BurstTimes::mark_hole(std::chrono::nanoseconds since_last, TrackerPoint& point) ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::mark_hole(std::chrono::nanoseconds since_last, Point& point) ABBE_RT {
   if (beam_lost_ &&
       since_last >= std::max<std::chrono::nanoseconds>(kShortestBreak, 3 * separation_)) {
     beam_lost_ = false;
@@ -152,9 +162,13 @@ void BurstTimes::mark_hole(std::chrono::nanoseconds since_last, TrackerPoint& po
       std::min<std::int64_t>((since_last + separation_ / 2) / separation_ - 1, INT32_MAX));
 }
 
-void BurstTimes::mark_pending(protocol::SampleHead& head) ABBE_RT {
+template <class Point>
+void BurstTimesOf<Point>::mark_pending(protocol::SampleHead& head) ABBE_RT {
   head.flags |= pending_flags_;
   pending_flags_ = 0;
 }
+
+template class BurstTimesOf<protocol::TrackerPoint>;
+template class BurstTimesOf<TimedHead>;
 
 }  // namespace abbe::drivers

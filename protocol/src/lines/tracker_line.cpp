@@ -1,13 +1,11 @@
 #include "abbe/protocol/lines/tracker_line.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <system_error>
 
 #include "abbe/protocol/lines/fields.hpp"
+#include "decode_columns.hpp"
 
 namespace abbe::protocol::lines {
 namespace {
@@ -22,73 +20,6 @@ constexpr double kLargestAzimuth_rad = 4.0 * std::numbers::pi;
 /// more.
 constexpr double kLargestElevation_rad = kRightAngle_rad + 1e-3;
 
-bool is_digit(char c) noexcept {
-  return c >= '0' && c <= '9';
-}
-
-int digits_of(TimeUnit unit) noexcept {
-  switch (unit) {
-    case TimeUnit::Seconds:
-      return 9;
-    case TimeUnit::Milliseconds:
-      return 6;
-    case TimeUnit::Microseconds:
-      return 3;
-    case TimeUnit::Nanoseconds:
-      break;
-  }
-  return 0;
-}
-
-/// Adds a decimal digit; false: the result does not fit.
-bool append_digit(std::int64_t& value, int digit) noexcept {
-  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max() / 2;
-  if (value > (kMost - digit) / 10) return false;
-  value = 10 * value + digit;
-  return true;
-}
-
-/// Reads the digits, without a detour over double: since 1970 there are 1.8e18 ns, of which a
-/// double resolves 256 ns.
-tl::expected<DeviceTime, What> time(std::string_view text, const LineFormat& format) noexcept {
-  const bool negative = !text.empty() && text.front() == '-';
-  if (!text.empty() && (text.front() == '-' || text.front() == '+')) text.remove_prefix(1);
-  const int places = digits_of(format.time_unit);
-  std::int64_t ns = 0;
-  std::size_t digits = 0;
-  int fraction = -1;  // digits after the decimal sign; -1: none was read yet
-
-  for (const char c : text) {
-    if (c == format.decimal_sign && fraction < 0) {
-      fraction = 0;
-      continue;
-    }
-    if (!is_digit(c)) return tl::unexpected{What::NotANumber};
-    ++digits;
-    if (fraction >= 0 && ++fraction > places) continue;  // below a nanosecond
-    if (!append_digit(ns, c - '0')) return tl::unexpected{What::OutOfRange};
-  }
-
-  if (digits == 0) return tl::unexpected{What::NotANumber};
-  for (int i = std::max(fraction, 0); i < places; ++i)
-    if (!append_digit(ns, 0)) return tl::unexpected{What::OutOfRange};
-
-  return DeviceTime{std::chrono::nanoseconds{negative ? -ns : ns}};
-}
-
-std::int32_t status_number(std::string_view text) noexcept {
-  std::int32_t value = 0;
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole = read.ec == std::errc{} && read.ptr == text.data() + text.size();
-  return whole ? value : 0;
-}
-
-bool is_valid_status(std::string_view text, const LineFormat& format) noexcept {
-  for (std::size_t i = 0; i < format.valid_status_count; ++i)
-    if (format.valid_status[i].text() == text) return true;
-  return false;
-}
-
 /// Largest magnitude of a coordinate in SI units.
 double limit_of(Column column) noexcept {
   switch (column) {
@@ -100,6 +31,19 @@ double limit_of(Column column) noexcept {
       return kRightAngle_rad + kLargestElevation_rad;
     default:
       return kLargestCoordinate_m;
+  }
+}
+
+ColumnUse use_of(Column column) noexcept {
+  switch (column) {
+    case Column::Ignored:
+      return ColumnUse::Ignored;
+    case Column::Time:
+      return ColumnUse::Time;
+    case Column::Status:
+      return ColumnUse::Status;
+    default:
+      return ColumnUse::Value;
   }
 }
 
@@ -140,14 +84,6 @@ std::array<double, 3> position(Values& values, const LineFormat& format) noexcep
 
 }  // namespace
 
-std::optional<StatusWord> StatusWord::from(std::string_view text) ABBE_RT {
-  if (text.empty() || text.size() > kCapacity) return std::nullopt;
-  StatusWord word;
-  std::copy(text.begin(), text.end(), word.bytes.begin());
-  word.length = static_cast<std::uint8_t>(text.size());
-  return word;
-}
-
 bool LineFormat::has(Column column) const ABBE_RT {
   const auto end = columns.begin() + static_cast<std::ptrdiff_t>(column_count);
   return std::find(columns.begin(), end, column) != end;
@@ -177,49 +113,18 @@ std::string_view format_fault(const LineFormat& format) ABBE_RT {
 
 tl::expected<TrackerLine, LineFault> decode(std::string_view line,
                                             const LineFormat& format) ABBE_RT {
-  const auto fault = [](What what, std::size_t column) {
-    return tl::unexpected{LineFault{what, static_cast<std::uint8_t>(column)}};
-  };
   TrackerLine decoded;
   Values values{};
-  Fields fields{line, format.separator};
+  const auto fault = decode_columns(
+      line, format, [&](std::size_t i) { return use_of(format.columns[i]); },
+      [&](std::string_view field, std::size_t i) {
+        return read_coordinate(field, format.columns[i], format, values);
+      },
+      decoded);
+  if (fault) return tl::unexpected{*fault};
 
-  for (std::size_t i = 0; i < format.column_count; ++i) {
-    const auto field = fields.next();
-    if (!field) return fault(What::MissingColumn, i + 1);
-    switch (const Column column = format.columns[i]) {
-      case Column::Ignored:
-        break;
-      case Column::Time: {
-        const auto at = time(*field, format);
-        if (!at) return fault(at.error(), i + 1);
-        decoded.time = *at;
-        break;
-      }
-      case Column::Status:
-        decoded.status = status_number(*field);
-        decoded.valid = is_valid_status(*field, format);
-        break;
-      default:
-        if (const auto what = read_coordinate(*field, column, format, values))
-          return fault(*what, i + 1);
-    }
-  }
-
-  // A separator after the last column is not a column.
-  if (const auto more = fields.next(); more && !more->empty())
-    return fault(What::TooManyColumns, format.column_count + 1);
   decoded.p_tracker_m = position(values, format);
   return decoded;
-}
-
-bool is_comment(std::string_view line) ABBE_RT {
-  const auto begin = line.find_first_not_of(" \t");
-  return begin == std::string_view::npos || line[begin] == '#';
-}
-
-bool is_heading(std::string_view line) ABBE_RT {
-  return std::none_of(line.begin(), line.end(), is_digit);
 }
 
 std::string_view name_of(Column column) ABBE_RT {
@@ -248,20 +153,8 @@ std::string_view name_of(Column column) ABBE_RT {
   return "?";
 }
 
-std::string_view text_of(What what) ABBE_RT {
-  switch (what) {
-    case What::MissingColumn:
-      return "missing";
-    case What::TooManyColumns:
-      return "more columns than configured";
-    case What::NotANumber:
-      return "not a number";
-    case What::OutOfRange:
-      return "impossible in the configured unit";
-    case What::TooLong:
-      return "longer than 512 bytes";
-  }
-  return "?";
+std::string_view column_name(const LineFormat& format, std::size_t index) ABBE_RT {
+  return name_of(format.columns[index]);
 }
 
 }  // namespace abbe::protocol::lines

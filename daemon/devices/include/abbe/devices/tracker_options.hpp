@@ -5,7 +5,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/config/kinds/tracker.hpp"
-#include "abbe/drivers/lines/tracker_device.hpp"
+#include "abbe/drivers/lines/device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 
 namespace abbe::daemon {

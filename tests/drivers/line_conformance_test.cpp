@@ -1,6 +1,8 @@
-#include "abbe/drivers/lines/tracker_device.hpp"
+#include "abbe/drivers/lines/device.hpp"
 #include "driver_conformance.hpp"
 #include "line_peer.hpp"
+
+#include <type_traits>
 
 #include "stepped_time.hpp"
 
@@ -10,7 +12,14 @@ namespace {
 using namespace std::chrono_literals;
 using line_sender::SenderWire;
 
-template <SenderWire::Kind kKind>
+drivers::lines::LineFormat format_of(std::type_identity<drivers::LinePoints>) {
+  return line_sender::time_x_y_z_status();
+}
+drivers::lines::ValueFormat format_of(std::type_identity<drivers::LineAxes>) {
+  return line_sender::time_axes_status();
+}
+
+template <class Content, SenderWire::Kind kKind>
 class FaultyLineSender {
  public:
   static constexpr std::chrono::nanoseconds kCycle = 200ms;
@@ -39,8 +48,8 @@ class FaultyLineSender {
   drivers::Device& device() { return *device_; }
   SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
-    std::array<protocol::TrackerPoint, 256> out{};
-    while (const std::size_t n = device_->points().pop(out)) {
+    std::array<typename Content::Sample, 256> out{};
+    while (const std::size_t n = device_->samples().pop(out)) {
       for (std::size_t i = 0; i < n; ++i) heads.push_back(out[i].head);
     }
   }
@@ -88,12 +97,12 @@ class FaultyLineSender {
   static constexpr bool kSerial = kKind == SenderWire::Kind::Serial;
   static constexpr int kFlood = kSerial ? 90 : 1800;
 
-  drivers::LineTrackerOptions options() const {
-    drivers::LineTrackerOptions o;
+  drivers::LineDeviceOptions<Content> options() const {
+    drivers::LineDeviceOptions<Content> o;
     o.address = wire_.address();
-    o.receiver.format = line_sender::time_x_y_z_status();
+    o.receiver.format = format_of(std::type_identity<Content>{});
     o.receiver.time_separation = line_sender::PrintedPoints::kSeparation;
-    o.point_capacity = kSerial ? 64 : 1024;
+    o.sample_capacity = kSerial ? 64 : 1024;
     return o;
   }
 
@@ -102,18 +111,30 @@ class FaultyLineSender {
   line_sender::PrintedPoints points_{time_.now()};
   bool holding_ = false;
   std::string held_, torn_;
-  std::unique_ptr<drivers::LineTrackerDevice> device_ =
-      drivers::LineTrackerDevice::create(options(), time_).value();
+  std::unique_ptr<drivers::LineDevice<Content>> device_ =
+      drivers::LineDevice<Content>::create(options(), time_).value();
 };
 
-using OverTcp = FaultyLineSender<SenderWire::Kind::Tcp>;
-using AsTcpServer = FaultyLineSender<SenderWire::Kind::TcpServer>;
-using OverUdp = FaultyLineSender<SenderWire::Kind::Udp>;
-using OverSerial = FaultyLineSender<SenderWire::Kind::Serial>;
+template <SenderWire::Kind kKind>
+using Points = FaultyLineSender<drivers::LinePoints, kKind>;
+template <SenderWire::Kind kKind>
+using AxisPositions = FaultyLineSender<drivers::LineAxes, kKind>;
+
+using OverTcp = Points<SenderWire::Kind::Tcp>;
+using AsTcpServer = Points<SenderWire::Kind::TcpServer>;
+using OverUdp = Points<SenderWire::Kind::Udp>;
+using OverSerial = Points<SenderWire::Kind::Serial>;
 INSTANTIATE_TYPED_TEST_SUITE_P(LinesTcp, DriverConformance, OverTcp);
 INSTANTIATE_TYPED_TEST_SUITE_P(LinesTcpServer, DriverConformance, AsTcpServer);
 INSTANTIATE_TYPED_TEST_SUITE_P(LinesUdp, DriverConformance, OverUdp);
 INSTANTIATE_TYPED_TEST_SUITE_P(LinesSerial, DriverConformance, OverSerial);
+
+using AxesOverTcp = AxisPositions<SenderWire::Kind::Tcp>;
+using AxesOverUdp = AxisPositions<SenderWire::Kind::Udp>;
+using AxesOverSerial = AxisPositions<SenderWire::Kind::Serial>;
+INSTANTIATE_TYPED_TEST_SUITE_P(AxisLinesTcp, DriverConformance, AxesOverTcp);
+INSTANTIATE_TYPED_TEST_SUITE_P(AxisLinesUdp, DriverConformance, AxesOverUdp);
+INSTANTIATE_TYPED_TEST_SUITE_P(AxisLinesSerial, DriverConformance, AxesOverSerial);
 
 }  // namespace
 }  // namespace abbe::tests

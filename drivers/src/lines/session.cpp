@@ -1,4 +1,4 @@
-#include "abbe/drivers/lines/tracker_device.hpp"
+#include "abbe/drivers/lines/session.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "abbe/protocol/printable.hpp"
-#include "abbe/result/try.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -24,11 +23,11 @@ double milliseconds_of(std::chrono::nanoseconds d) {
 
 /// "2 lines cannot be read; the last one: column 3 (z): not a number: "1.0 2.0 abc"".
 std::string text_of_unreadable(std::uint64_t count, const UnreadableLine& line,
-                               const lines::LineFormat& format) {
+                               std::span<const std::string> columns) {
   const std::size_t column = line.fault.column;
   std::string place;
-  if (column > 0 && column <= format.column_count)
-    place = fmt::format("column {} ({}): ", column, lines::name_of(format.columns[column - 1]));
+  if (column > 0 && column <= columns.size())
+    place = fmt::format("column {} ({}): ", column, columns[column - 1]);
   else if (column > 0)
     place = fmt::format("column {}: ", column);
   return fmt::format("{} line{} cannot be read{} {}{}: \"{}\"", count, count == 1 ? "" : "s",
@@ -38,47 +37,33 @@ std::string text_of_unreadable(std::uint64_t count, const UnreadableLine& line,
 
 }  // namespace
 
-LineReceiverOptions receiver_options(const LineTrackerOptions& options) {
-  LineReceiverOptions receiver = options.receiver;
-  receiver.datagrams = std::holds_alternative<LineUdp>(options.address);
-  receiver.begins_anywhere = std::holds_alternative<LineSerial>(options.address);
-  return receiver;
-}
-
-Result<std::unique_ptr<LineTrackerDevice>> LineTrackerDevice::create(
-    const LineTrackerOptions& options, const TimeSource& time) {
-  const auto refused = [&](std::string_view what) {
-    return tl::unexpected{
-        Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.name, what)}};
-  };
-  if (const auto valid = check(options.address); !valid) return refused(valid.error().text);
-  if (const auto what = lines::format_fault(options.receiver.format); !what.empty())
-    return refused(fmt::format("the format of the lines {}", what));
-  return std::unique_ptr<LineTrackerDevice>{new LineTrackerDevice{options, time}};
-}
-
-LineTrackerDevice::LineTrackerDevice(const LineTrackerOptions& options, const TimeSource& time)
-    : options_(options),
-      name_(fmt::format("{} {}", options.name, text_of(options.address))),
+LineSession::LineSession(LineSessionOptions options, LineTexts texts, const TimeSource& time)
+    : options_(std::move(options)),
+      texts_(std::move(texts)),
+      name_(fmt::format("{} {}", options_.name, text_of(options_.address))),
       time_(time),
-      link_(options.address),
-      points_(options.point_capacity),
-      raw_(options.raw_capacity_blocks),
-      receiver_(receiver_options(options)),
+      link_(options_.address),
+      raw_(options_.raw_capacity_blocks),
       due_(time.now()) {
   board_.set_state("disconnected");
 }
 
-void LineTrackerDevice::wait(std::chrono::nanoseconds at_most) {
-  look_at_lines();
-  report_unreadable();
-  report_times();
-  report_rate();
+void LineSession::report(const LineReception& found) {
+  look_at_lines(found.counters);
+  report_unreadable(found);
+  report_times(found.counters.times);
+  report_skew(found.skew_beyond_limit);
+  report_rate(found.other_separation);
+  report_condition(found);
+  report_turned_away();
+}
+
+void LineSession::wait(std::chrono::nanoseconds at_most) {
   if (waits_to_open_ && time_.now() >= due_) open();
   await_bytes(at_most);
 }
 
-void LineTrackerDevice::open() {
+void LineSession::open() {
   waits_to_open_ = false;
   due_ = link_.awaits_sender() ? protocol::HostTime::max() : time_.now() + options_.connect_timeout;
   if (const auto opened = link_.open(); !opened) return lose(opened.error().text);
@@ -87,7 +72,7 @@ void LineTrackerDevice::open() {
 
 /// A time-out is judged only after the bytes that wait were read: when the thread was delayed, the
 /// deadline has passed although there are lines.
-void LineTrackerDevice::await_bytes(std::chrono::nanoseconds at_most) {
+void LineSession::await_bytes(std::chrono::nanoseconds at_most) {
   const bool overdue_now = !waits_to_open_ && due_ <= time_.now();
   if (overdue_now) {
     if (!take_ready(std::chrono::nanoseconds{0})) overdue();
@@ -100,7 +85,7 @@ void LineTrackerDevice::await_bytes(std::chrono::nanoseconds at_most) {
 }
 
 /// False: nothing happened within `wall`.
-bool LineTrackerDevice::take_ready(std::chrono::nanoseconds wall) {
+bool LineSession::take_ready(std::chrono::nanoseconds wall) {
   const auto ready = link_.wait(wall);
   if (!ready)
     lose(ready.error().text);
@@ -113,14 +98,14 @@ bool LineTrackerDevice::take_ready(std::chrono::nanoseconds wall) {
   return true;
 }
 
-void LineTrackerDevice::established() {
+void LineSession::established() {
   arrival_ = time_.now();
   began_ = true;
   board_.set_state("connected");
   due_ = time_.now() + options_.silence_timeout;
 }
 
-void LineTrackerDevice::read() {
+void LineSession::read() {
   arrival_ = time_.now();
   discard_reads();
   bool truncated = false;
@@ -139,14 +124,14 @@ void LineTrackerDevice::read() {
                     kMostRead));
 }
 
-void LineTrackerDevice::lose(const std::string& why) {
+void LineSession::lose(const std::string& why) {
   close();
   board_.set_state("disconnected");
   fault_once(why);
   open_later(kLineRetry);
 }
 
-void LineTrackerDevice::close() {
+void LineSession::close() {
   if (link_.established())
     raw_.push_bytes(time_.now(), protocol::RawBlock::Direction::ToDevice, {});
   link_.close();
@@ -155,13 +140,13 @@ void LineTrackerDevice::close() {
   board_.set_connected(false);
 }
 
-void LineTrackerDevice::open_later(std::chrono::nanoseconds pause) {
+void LineSession::open_later(std::chrono::nanoseconds pause) {
   waits_to_open_ = true;
   due_ = time_.now() + pause;
 }
 
 /// No connection, or no line on it, in time.
-void LineTrackerDevice::overdue() {
+void LineSession::overdue() {
   const bool established = link_.established();
   board_.set_state("faulted");
   board_.set_connected(false);
@@ -177,9 +162,8 @@ void LineTrackerDevice::overdue() {
   open_later(kLineRetry);
 }
 
-/// The lines that receive() has read in the last cycle.
-void LineTrackerDevice::look_at_lines() {
-  const LineCounters counters = receiver_.counters();
+/// The lines that were read in the last cycle.
+void LineSession::look_at_lines(const LineCounters& counters) {
   const std::uint64_t seen = counters.points + counters.headings + counters.unreadable;
   const bool points = counters.points != std::exchange(points_seen_, counters.points);
   if (seen == std::exchange(lines_seen_, seen) || !link_.established()) return;
@@ -193,69 +177,82 @@ void LineTrackerDevice::look_at_lines() {
   }
 }
 
-void LineTrackerDevice::report_unreadable() {
-  const std::uint64_t unreadable = receiver_.counters().unreadable;
+void LineSession::report_unreadable(const LineReception& found) {
+  const std::uint64_t unreadable = found.counters.unreadable;
   if (unreadable == unreadable_reported_ || time_.now() < unreadable_report_at_) return;
   unreadable_report_at_ = time_.now() + kUnreadableReports;
   fault(text_of_unreadable(unreadable - std::exchange(unreadable_reported_, unreadable),
-                           receiver_.unreadable(), options_.receiver.format));
+                           found.unreadable, texts_.columns));
 }
 
-/// Reports points whose time did not fit, jumps of the sender's clock, its rate, and senders that
-/// were turned away.
-void LineTrackerDevice::report_times() {
-  const auto& counters = receiver_.counters().times;
+/// Reports samples whose time did not fit, and jumps of the sender's clock.
+void LineSession::report_times(const BurstTimeCounters& counters) {
   const auto refused =
       counters.time_disorder - std::exchange(times_refused_seen_, counters.time_disorder);
   const auto jumps = counters.time_jumps - std::exchange(time_jumps_seen_, counters.time_jumps);
+  const auto many = texts_.words.many;
   if (jumps > 0)
     fault(
-        "the sender's clock jumped: the points before and after the jump are not used together; "
-        "do not set its clock during a run");
+        fmt::format("the sender's clock jumped: the {} before and after the jump are not used "
+                    "together; do not set its clock during a run",
+                    many));
   else if (refused > 0)
-    fault(
-        fmt::format("the times of {} points do not fit those of the others: these points are not "
-                    "used",
-                    refused));
+    fault(fmt::format("the times of {} {} do not fit those of the others: these {} are not used",
+                      refused, many, many));
+}
 
-  const double skew = receiver_.skew_beyond_limit();
-  if (!std::exchange(clock_reported_, skew != 0.0) && skew != 0.0) {
-    constexpr double kPpm = 1e6;
-    fault(
-        fmt::format("the sender's clock runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: its "
-                    "points are marked ClockUnsettled; check the unit of the time column",
-                    kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
-                    kPpm * options_.receiver.clock.max_skew));
-  }
+void LineSession::report_skew(double skew) {
+  if (std::exchange(clock_reported_, skew != 0.0) || skew == 0.0) return;
+  constexpr double kPpm = 1e6;
+  fault(
+      fmt::format("the sender's clock runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: its {} "
+                  "are marked ClockUnsettled; check the unit of the time column",
+                  kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow", kPpm * texts_.max_skew,
+                  texts_.words.many));
+}
 
+void LineSession::report_rate(std::chrono::nanoseconds other) {
+  if (std::exchange(rate_reported_, other.count() != 0) || other.count() == 0) return;
+  const LineWords& words = texts_.words;
+  const double other_ms = milliseconds_of(other);
+  fault(
+      fmt::format("a {} comes every {:.4g} ms, {} states {:.4g} ms: gaps are marked in the wrong "
+                  "places; set {} = {:.6g}",
+                  words.one, other_ms, words.rate_key, milliseconds_of(texts_.time_separation),
+                  words.rate_key, 1e3 / other_ms));
+}
+
+void LineSession::report_condition(const LineReception& found) {
+  std::string_view condition;
+  if (found.invalid)
+    condition = "the status column marks the measurements as invalid: they are not used";
+  else if (found.together)
+    condition =
+        "several lines come together, of which only the newest can be used without a time column: "
+        "let the sender print its time, or each line at once";
+  if (std::exchange(condition_, condition) != condition)
+    board_.set_condition(time_.now(), condition);
+}
+
+void LineSession::report_turned_away() {
   const auto away = link_.turned_away();
   if (away != std::exchange(turned_away_seen_, away))
     fault("a second sender was turned away while one is connected");
 }
 
-void LineTrackerDevice::report_rate() {
-  const auto other = receiver_.other_separation();
-  if (std::exchange(rate_reported_, other.count() != 0) || other.count() == 0) return;
-  fault(
-      fmt::format("a point comes every {:.4g} ms, point_rate_hz states {:.4g} ms: gaps are marked "
-                  "in the wrong places; set point_rate_hz = {:.6g}",
-                  milliseconds_of(other), milliseconds_of(options_.receiver.time_separation),
-                  1e3 / milliseconds_of(other)));
-}
-
-void LineTrackerDevice::fault(const std::string& what) {
+void LineSession::fault(const std::string& what) {
   board_.fault(time_.now(), name_ + ": " + what);
 }
 
 /// The same cause, found again with every attempt, counts once.
-void LineTrackerDevice::fault_once(const std::string& what) {
+void LineSession::fault_once(const std::string& what) {
   if (what == reported_) return;
   reported_ = what;
   fault(what);
 }
 
-DeviceStatus LineTrackerDevice::status() const {
-  return board_.read(options_.name, points_.dropped(), raw_.dropped());
+DeviceStatus LineSession::status(std::uint64_t dropped) const {
+  return board_.read(options_.name, dropped, raw_.dropped());
 }
 
 }  // namespace abbe::drivers

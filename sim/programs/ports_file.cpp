@@ -16,6 +16,10 @@ Ports ports_of(Simulation& simulation, const std::string& can_interface) {
     ports.line_tracker = simulation.line_tracker()->where();
     if (const auto port = simulation.line_tracker()->port(); port != 0) ports.tracker = port;
   }
+  if (simulation.line_axes()) {
+    ports.line_axes = simulation.line_axes()->where();
+    if (const auto port = simulation.line_axes()->port(); port != 0) ports.axis_lines = port;
+  }
   if (simulation.control()) ports.control = simulation.control()->port();
   ports.can_interface = can_interface;
   if (simulation.bus() && can_interface.empty()) ports.can = simulation.bus()->port();
@@ -43,6 +47,7 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
     lines +=
         fmt::format("usbip_port{}={}\n", i == 0 ? "" : fmt::format("_{}", i + 1), ports.usbip[i]);
   if (ports.cmm) lines += fmt::format("cmm_port={}\n", *ports.cmm);
+  if (ports.axis_lines) lines += fmt::format("axis_lines_port={}\n", *ports.axis_lines);
 
   if (!path.empty()) {
     ABBE_TRY(write_file(path, lines));
@@ -52,6 +57,7 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
     fmt::print("tracker: {}\n", ports.line_tracker);
   else if (ports.tracker)
     fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
+  if (!ports.line_axes.empty()) fmt::print("axes: {}\n", ports.line_axes);
   if (ports.control)
     fmt::print("control: position records on 127.0.0.1:{} (UDP)\n", *ports.control);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);

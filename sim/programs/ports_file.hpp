@@ -3,7 +3,8 @@
 /// file for scripts as soon as all devices listen. The lines of the file can be read by a shell and
 /// by a TOML reader; a device that does not exist has no line:
 ///
-///   tracker_port=N, control_port=N, can_port=N or can_interface=NAME, usbip_port=N, cmm_port=N
+///   tracker_port=N, control_port=N, can_port=N or can_interface=NAME, usbip_port=N, cmm_port=N,
+///   axis_lines_port=N
 
 #include <cstdint>
 #include <optional>
@@ -25,9 +26,10 @@ struct NamedPlace {
 
 struct Ports {
   std::optional<std::uint16_t> tracker;
-  /// address to which it prints its lines; empty: the tracker uses emScon
-  std::string line_tracker;
-  std::optional<std::uint16_t> control;  ///< UDP port for position records
+  std::string line_tracker;  ///< where it prints its lines; empty: it speaks emScon
+  std::string line_axes;     ///< where the axes print their lines; empty: nowhere
+  std::optional<std::uint16_t> axis_lines;
+  std::optional<std::uint16_t> control;  ///< UDP, position records
   std::optional<std::uint16_t> can;
   std::vector<NamedPlace> environment;
   std::vector<std::uint16_t> usbip;  ///< one per counter card

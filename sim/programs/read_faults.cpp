@@ -20,7 +20,8 @@ ScheduledFault read_fault(Section& section) {
                                  {"encoder", FaultTarget::Encoder},
                                  {"environment", FaultTarget::Environment},
                                  {"counter_card", FaultTarget::CounterCard},
-                                 {"cmm", FaultTarget::MeasuringMachine}},
+                                 {"cmm", FaultTarget::MeasuringMachine},
+                                 {"axis_lines", FaultTarget::AxisLines}},
                                 Need::Required);
   section.get("kind", kind);
   const auto known = fault_kind(scheduled.target, kind);

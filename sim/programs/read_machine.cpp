@@ -9,11 +9,19 @@
 #include <string>
 #include <vector>
 
+#include "read_axis_lines.hpp"
 #include "read_counter_card.hpp"
 #include "read_measuring_machine.hpp"
 #include "read_tracker.hpp"
 
 namespace abbe::sim {
+
+bool is_rotary(Section root, const std::string& name) {
+  std::string kind;
+  Section axis = root.child("axes").child(name);
+  return axis.present() && axis.get("kind", kind) && kind == "rotary";
+}
+
 namespace {
 
 void read_axes(Section root, TruthMachine& truth) {
@@ -50,12 +58,6 @@ void read_rotary_scale(Section& section, EncoderNodeOptions& node) {
     node.units_per_revolution =
         static_cast<std::uint32_t>(std::lround(2e9 * std::numbers::pi / step_nrad));
   section.get("offset_rad", node.offset, kPlain, kAnyNumber);
-}
-
-bool is_rotary(Section root, const std::string& name) {
-  std::string kind;
-  Section axis = root.child("axes").child(name);
-  return axis.present() && axis.get("kind", kind) && kind == "rotary";
 }
 
 std::optional<EncoderNodeOptions> read_encoder_node(Section root, Section& section) {
@@ -148,6 +150,7 @@ void read_machine_tables(Section root, SetupDraft& draft) {
   encoder.get_maybe_empty("interface", simulation.bus->interface);
   read_sync(encoder, simulation);
   read_encoder_nodes(root, encoder, simulation.nodes);
+  read_axis_lines(root, simulation);
   read_counter_card(root.child("counter_card"), simulation);
   read_reference(root.child("reference"), simulation);
   read_cmm(root.child("cmm"), simulation);

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "files.hpp"
+#include "read_axis_lines.hpp"
 #include "read_counter_card.hpp"
 #include "read_environment.hpp"
 #include "read_faults.hpp"
@@ -92,6 +93,7 @@ void read_sim(Section sim, const std::string& file, SetupDraft& draft) {
   if (encoder.get("sync_period_us", sync_period_us, kPlain, {100.0, 1e6}))
     simulation.sync_period = seconds_to_ns(sync_period_us * 1e-6);
   encoder.close(Hint::AllKeys);
+  read_sim_axis_lines(sim.child("axis_lines"), simulation);
   read_environment(sim, simulation.environment);
   read_sim_counter_card(sim.child("counter_card"), simulation);
   read_sim_evemu(sim.child("evemu"), draft.setup);

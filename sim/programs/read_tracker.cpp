@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "read_lines.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -82,32 +81,6 @@ void read_columns(Section& section, lines::LineFormat& format) {
   }
 }
 
-void read_units(Section& section, lines::LineFormat& format) {
-  constexpr double kDegree = std::numbers::pi / 180.0;
-  section.get_word<double>("length_unit", format.metres_per_length,
-                           {{"mm", 1e-3}, {"m", 1.0}, {"um", 1e-6}, {"inch", 0.0254}});
-  section.get_word<double>(
-      "angle_unit", format.radians_per_angle,
-      {{"rad", 1.0}, {"deg", kDegree}, {"gon", kDegree * 0.9}, {"mrad", 1e-3}});
-  section.get_word<lines::TimeUnit>("time_unit", format.time_unit,
-                                    {{"s", lines::TimeUnit::Seconds},
-                                     {"ms", lines::TimeUnit::Milliseconds},
-                                     {"us", lines::TimeUnit::Microseconds},
-                                     {"ns", lines::TimeUnit::Nanoseconds}});
-  section.get_word<char>("separator", format.separator,
-                         {{"space", ' '}, {"tab", '\t'}, {"comma", ','}, {"semicolon", ';'}});
-  section.get_word<char>("decimal", format.decimal_sign, {{"point", '.'}, {"comma", ','}});
-  std::vector<std::string> valid;
-  if (!section.get("valid_status", valid)) return;
-  format.valid_status_count = 0;
-  for (const std::string& text : valid) {
-    const auto word = lines::StatusWord::from(text);
-    if (!word || format.valid_status_count == lines::LineFormat::kMostWords)
-      return section.fault("valid_status", "has too many words, or one that is too long");
-    format.valid_status[format.valid_status_count++] = *word;
-  }
-}
-
 }  // namespace
 
 void read_lines(Section& tracker, SimulationSetup& simulation) {
@@ -116,17 +89,11 @@ void read_lines(Section& tracker, SimulationSetup& simulation) {
   if (!as_lines) return simulation.tracker_lines.reset();
   if (!simulation.tracker_lines) simulation.tracker_lines.emplace();
   auto& line = *simulation.tracker_lines;
-  tracker.get_word<LineTransport>("transport", line.output.transport,
-                                  {{"tcp", LineTransport::Tcp},
-                                   {"tcp-server", LineTransport::TcpServer},
-                                   {"udp", LineTransport::Udp},
-                                   {"serial", LineTransport::Serial}});
-  tracker.get("serial", line.output.link);
-  double rate_hz = 0.0;
-  if (tracker.get("point_rate_hz", rate_hz, kPlain, {0.1, 10e3}))
-    line.separation = std::chrono::nanoseconds{std::llround(1e9 / rate_hz)};
+  read_line_output(tracker, line.output);
+  read_line_rate(tracker, "point_rate_hz", line.separation);
   read_columns(tracker, line.format);
-  read_units(tracker, line.format);
+  read_line_units(tracker, line.format.metres_per_length, line.format.radians_per_angle);
+  read_line_syntax(tracker, line.format);
   if (line.format.column_count == 0)
     return tracker.fault("columns", "missing: the columns of a line, in their order");
   if (const auto what = lines::format_fault(line.format); !what.empty())

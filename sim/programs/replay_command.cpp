@@ -61,25 +61,38 @@ void read_serials(const std::string& configuration, std::map<std::string, std::s
   }
 }
 
-/// Reads, from the recorded configuration, how the daemon received the lines of the tracker.
-void read_transport(const std::string& configuration, std::map<std::string, LineOutput>& lines) {
-  const auto root = sections::parse_bounded(configuration, "recorded configuration");
-  if (!root) return;
-  const auto tracker = (*root)["tracker"];
-  if (tracker["protocol"].value_or(std::string{}) != "lines") return;
+LineOutput recorded_output(toml::node_view<const toml::node> table) {
   LineOutput output;
-  const auto transport = tracker["transport"].value_or(std::string{});
+  const auto transport = table["transport"].value_or(std::string{});
   if (transport == "tcp-server") output.transport = LineTransport::TcpServer;
   if (transport == "udp") output.transport = LineTransport::Udp;
   if (transport == "serial") output.transport = LineTransport::Serial;
   constexpr std::int64_t kMostPorts = 65535;
-  const auto port = tracker["port"].value_or(std::int64_t{0});
+  const auto port = table["port"].value_or(std::int64_t{0});
   if (port > 0 && port <= kMostPorts && output.transport != LineTransport::Tcp)
     output.port = static_cast<std::uint16_t>(port);
-  lines[tracker["name"].value_or(std::string{"tracker"})] = output;
+  return output;
 }
 
-Ports ports_of(const std::vector<ReplayedPlace>& places) {
+/// Reads from the recorded configuration how the lines of a device came. Returns the name of the
+/// device that sends axis positions; empty: none.
+std::string read_transports(const std::string& configuration,
+                            std::map<std::string, LineOutput>& lines) {
+  const auto root = sections::parse_bounded(configuration, "recorded configuration");
+  if (!root) return {};
+  const toml::node_view<const toml::node> tracker{(*root)["tracker"]};
+  if (tracker["protocol"].value_or(std::string{}) == "lines")
+    lines[tracker["name"].value_or(std::string{"tracker"})] = recorded_output(tracker);
+
+  const toml::node_view<const toml::node> axes{(*root)["axis_lines"]};
+  if (!axes.is_table()) return {};
+  auto name = axes["name"].value_or(std::string{"axis_lines"});
+  lines[name] = recorded_output(axes);
+  return name;
+}
+
+/// `axes`: the name of the device that sends axis positions as lines.
+Ports ports_of(const std::vector<ReplayedPlace>& places, const std::string& axes) {
   Ports ports;
   for (const ReplayedPlace& place : places) {
     fmt::print(stderr, "replay: {}: {}\n", place.name, place.what);
@@ -105,8 +118,8 @@ Ports ports_of(const std::vector<ReplayedPlace>& places) {
         ports.cmm = place.port;
         break;
       case RecordedKind::Lines:
-        ports.line_tracker = place.what;
-        if (place.port != 0) ports.tracker = place.port;
+        (place.name == axes ? ports.line_axes : ports.line_tracker) = place.what;
+        if (place.port != 0) (place.name == axes ? ports.axis_lines : ports.tracker) = place.port;
         break;
     }
   }
@@ -114,7 +127,12 @@ Ports ports_of(const std::vector<ReplayedPlace>& places) {
   return ports;
 }
 
-Result<std::unique_ptr<Replay>> open(const ReplayOptions& options, HostTime now) {
+struct OpenReplay {
+  std::unique_ptr<Replay> replay;
+  std::string axes;  ///< as in ports_of()
+};
+
+Result<OpenReplay> open(const ReplayOptions& options, HostTime now) {
   const auto text = read_file(options.file);
   ABBE_TRY(text);
   const auto bytes = std::as_bytes(std::span(*text));
@@ -124,16 +142,22 @@ Result<std::unique_ptr<Replay>> open(const ReplayOptions& options, HostTime now)
   setup.bus.speed = options.speed;
   ABBE_TRY(read_places(options, setup));
   read_serials(recorded_configuration(bytes), setup.serials);
-  read_transport(recorded_configuration(bytes), setup.lines);
-  return Replay::open(*devices, setup, now);
+  OpenReplay opened{.replay = nullptr,
+                    .axes = read_transports(recorded_configuration(bytes), setup.lines)};
+  setup.axes = opened.axes;
+  auto replay = Replay::open(*devices, setup, now);
+  ABBE_TRY(replay);
+  opened.replay = std::move(*replay);
+  return opened;
 }
 
 int replay(const ReplayOptions& options) {
   const EventLoop loop(options.speed);
   const auto opened = open(options, loop.clock().now());
   if (!opened) return report(opened.error());
-  Replay& replay = **opened;
-  if (const auto announced = announce_ports(ports_of(replay.places()), options.ports_file);
+  Replay& replay = *opened->replay;
+  if (const auto announced =
+          announce_ports(ports_of(replay.places(), opened->axes), options.ports_file);
       !announced)
     return report(announced.error());
   bool was_finished = false;

@@ -131,6 +131,8 @@ void share_seed_and_speed(SetupDraft& draft) {
     node.noise = draft.encoder_noise;
   }
 
+  if (simulation.axis_lines)
+    simulation.axis_lines->options.times.seed = static_cast<std::uint64_t>(draft.seed);
   if (simulation.measuring_machine)
     simulation.measuring_machine->machine.seed = static_cast<std::uint64_t>(draft.seed);
   if (simulation.surface) simulation.surface->seed = static_cast<std::uint64_t>(draft.seed);

@@ -73,6 +73,14 @@ constexpr std::array kMeasuringMachineFaults{
     Name{"garbage", FaultKind::LineGarbage},
 };
 
+constexpr std::array kAxisLinesFaults{
+    Name{"invalid", FaultKind::PrismError},
+    Name{"stall", FaultKind::Stall},
+    Name{"mute", FaultKind::Mute},
+    Name{"disconnect", FaultKind::Disconnect},
+    Name{"garbage", FaultKind::TrackerGarbage},
+};
+
 std::span<const Name> names_for(FaultTarget target) {
   switch (target) {
     case FaultTarget::Tracker:
@@ -85,6 +93,8 @@ std::span<const Name> names_for(FaultTarget target) {
       return kCounterCardFaults;
     case FaultTarget::MeasuringMachine:
       return kMeasuringMachineFaults;
+    case FaultTarget::AxisLines:
+      return kAxisLinesFaults;
   }
 
   return {};

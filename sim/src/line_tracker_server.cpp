@@ -153,6 +153,7 @@ void LineServer<Source>::add_poll_fds(std::vector<pollfd>& fds) const {
   if (receiver_) add_client_fd(receiver_.get(), !unsent_.empty(), fds);
 }
 
+template class LineServer<LineAxes>;
 template class LineServer<LineTracker>;
 template class LineServer<RecordedLines>;
 

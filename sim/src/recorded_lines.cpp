@@ -5,8 +5,8 @@
 
 namespace abbe::sim {
 
-RecordedLines::RecordedLines(const RecordedDevice& device, ReplayTimeline& timeline)
-    : timeline_(timeline) {
+RecordedLines::RecordedLines(const RecordedDevice& device, ReplayTimeline& timeline, bool leads)
+    : timeline_(timeline), leads_(leads) {
   for (const RecordedBlock& block : device.blocks) {
     if (block.connects() || connections_.empty()) connections_.push_back({block.time, {}});
     if (block.connects() || (block.to_device && !block.lost())) continue;
@@ -19,13 +19,13 @@ void RecordedLines::connected(HostTime now) {
   if (std::exchange(played_, true)) connection_ = (connection_ + 1) % connections_.size();
   connected_ = true;
   next_ = 0;
-  timeline_.restart(connection().began, now);
+  if (leads_) timeline_.restart(connection().began, now);
 }
 
 void RecordedLines::disconnected() {
   connected_ = false;
   out_.clear();
-  if (connection_ + 1 == connections_.size()) timeline_.rewind();
+  if (leads_ && connection_ + 1 == connections_.size()) timeline_.rewind();
 }
 
 HostTime RecordedLines::next_due() const {
@@ -37,11 +37,26 @@ void RecordedLines::advance(HostTime now) {
   while (next_due() <= now) {
     const RecordedBlock& block = connection().blocks[next_++];
     if (block.lost()) hang_up_ = true;
-    std::ranges::transform(block.bytes, std::back_inserter(out_),
-                           [](std::byte b) { return static_cast<char>(b); });
+    if (leads_ || now - timeline_.due(block.time) <= kOutOfStep)
+      print(block);
+    else
+      within_line_ = true;
   }
   const bool last = connection_ + 1 == connections_.size();
   finished_ = finished_ || (played_ && last && next_ >= connection().blocks.size());
+}
+
+/// From the beginning of a line on.
+void RecordedLines::print(const RecordedBlock& block) {
+  auto from = block.bytes.begin();
+  if (within_line_) {
+    from = std::ranges::find(block.bytes, std::byte{'\n'});
+    if (from == block.bytes.end()) return;
+    ++from;
+    within_line_ = false;
+  }
+  std::transform(from, block.bytes.end(), std::back_inserter(out_),
+                 [](std::byte b) { return static_cast<char>(b); });
 }
 
 std::string RecordedLines::take_output() {

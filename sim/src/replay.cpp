@@ -209,15 +209,18 @@ class Maker {
   /// receives there again.
   [[nodiscard]] Made lines(const RecordedDevice& device) const {
     LineOutput output = chosen(setup_.lines, device.name, LineOutput{});
+    const std::uint16_t port = device.name == setup_.axes ? std::uint16_t{0} : setup_.tracker_port;
     if (output.transport == LineTransport::Serial)
       output.link = link_of(device);
     else if (output.transport == LineTransport::Tcp)
-      output.port = chosen(setup_.ports, device.name, setup_.tracker_port);
+      output.port = chosen(setup_.ports, device.name, port);
     else
-      output.port = chosen(setup_.ports, device.name,
-                           setup_.tracker_port != 0 ? setup_.tracker_port : output.port);
+      output.port = chosen(setup_.ports, device.name, port != 0 ? port : output.port);
     auto server = LineServer<RecordedLines>::open(
-        output, std::make_unique<RecordedLines>(device, timeline_), now_);
+        output,
+        std::make_unique<RecordedLines>(device, timeline_,
+                                        !has_tracker_ || device.name != setup_.axes),
+        now_);
     ABBE_TRY(server);
     return std::make_unique<ReplayedLines>(device.name, output.link, std::move(*server));
   }
@@ -240,8 +243,9 @@ class Maker {
 Result<std::unique_ptr<Replay>> Replay::open(const std::vector<RecordedDevice>& devices,
                                              const ReplaySetup& setup, HostTime now) {
   std::unique_ptr<Replay> replay(new Replay);
-  const bool has_tracker = std::ranges::any_of(devices, [](const auto& d) {
-    return d.kind == RecordedKind::Tracker || d.kind == RecordedKind::Lines;
+  const bool has_tracker = std::ranges::any_of(devices, [&](const auto& d) {
+    return d.kind == RecordedKind::Tracker ||
+           (d.kind == RecordedKind::Lines && d.name != setup.axes);
   });
   const Maker maker(setup, replay->timeline_, has_tracker, now);
   for (const RecordedDevice& device : devices) {

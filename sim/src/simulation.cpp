@@ -32,6 +32,9 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
       new Simulation(setup.truth, std::move(*path), setup, std::move(control)));
 
   ABBE_TRY(simulation->open_tracker(setup, now));
+  if (setup.axis_lines) {
+    ABBE_TRY(simulation->open_line_axes(*setup.axis_lines, now));
+  }
 
   if (setup.bus) {
     auto nodes = setup.nodes;
@@ -97,10 +100,19 @@ Result<void> Simulation::open_tracker(const SimulationSetup& setup, HostTime now
   return {};
 }
 
+Result<void> Simulation::open_line_axes(const PrintedAxes& axes, HostTime now) {
+  auto server = LineAxesServer::open(axes.output,
+                                     std::make_unique<LineAxes>(axes.options, machine_, now), now);
+  ABBE_TRY(server);
+  line_axes_.emplace(std::move(*server));
+  return {};
+}
+
 void Simulation::poll(HostTime now) {
   if (control_) control_->poll(now);
   if (tracker_) tracker_->poll(now);
   if (line_tracker_) line_tracker_->poll(now);
+  if (line_axes_) line_axes_->poll(now);
   start_machine(now);
   touch(now);
   while (const auto* fault = faults_.take_due(machine_, now)) inject(*fault, now);
@@ -162,6 +174,10 @@ void Simulation::inject(const ScheduledFault& next, HostTime now) {
     line_tracker_->device().inject(next.fault, now);
     line_tracker_->poll(now);
   }
+  if (next.target == FaultTarget::AxisLines && line_axes_) {
+    line_axes_->device().inject(next.fault, now);
+    line_axes_->poll(now);
+  }
   if (next.target == FaultTarget::MeasuringMachine && measuring_machine_)
     measuring_machine_->device().inject(next.fault, now);
   if (next.target == FaultTarget::Environment) inject_environment(next.fault, now);
@@ -179,6 +195,7 @@ HostTime Simulation::next_due() const {
   HostTime due = faults_.next_due(machine_);
   if (tracker_) due = std::min(due, tracker_->next_due());
   if (line_tracker_) due = std::min(due, line_tracker_->next_due());
+  if (line_axes_) due = std::min(due, line_axes_->next_due());
   if (!bus_apart_) due = std::min(due, next_bus_due());
   for (const ModbusServer& server : environment_) due = std::min(due, server.next_due());
   for (const UsbipServer& card : counter_cards_) due = std::min(due, card.next_due());
@@ -190,6 +207,7 @@ void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
   if (control_) fds.push_back({control_->fd(), POLLIN, 0});
   if (tracker_) tracker_->add_poll_fds(fds);
   if (line_tracker_) line_tracker_->add_poll_fds(fds);
+  if (line_axes_) line_axes_->add_poll_fds(fds);
   if (bus_ && !bus_apart_) fds.push_back({bus_->fd(), POLLIN, 0});
   for (const ModbusServer& server : environment_) server.add_poll_fds(fds);
   for (const UsbipServer& card : counter_cards_) card.add_poll_fds(fds);

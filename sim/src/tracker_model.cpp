@@ -65,17 +65,11 @@ TrackerView observe(const TrackerModel& model, const VirtualMachine& machine, Ho
 }
 
 DeviceTime device_time(const TrackerModel& model, HostTime power_on, HostTime at) {
-  // Only the drift is computed as a double, so that the elapsed nanoseconds stay exact.
-  const std::chrono::nanoseconds since = at - power_on;
-  const auto drift = seconds_to_ns(ns_to_seconds(since) * model.clock_drift_ppm * 1e-6);
-  return DeviceTime{seconds_to_ns(model.clock_offset_s) + since + drift};
+  return device_time(clock_of(model), power_on, at);
 }
 
 HostTime host_time(const TrackerModel& model, HostTime power_on, DeviceTime at) {
-  const std::chrono::nanoseconds on_its_clock =
-      at.time_since_epoch() - seconds_to_ns(model.clock_offset_s);
-  const double ppm = model.clock_drift_ppm * 1e-6;
-  return power_on + on_its_clock - seconds_to_ns(ns_to_seconds(on_its_clock) * ppm / (1.0 + ppm));
+  return host_time(clock_of(model), power_on, at);
 }
 
 std::chrono::nanoseconds burst_interval(std::uint64_t seed, std::uint64_t burst) {

@@ -27,7 +27,8 @@ class SimExample : public testing::Test {
     fs::create_directories(folder_);
     write("machine.toml", to_toml(config_tables::half_metre_mill()) +
                               to_toml(config_tables::CounterCard{}) +
-                              "[cmm]\nhost = \"127.0.0.1\"\n");
+                              "[cmm]\nhost = \"127.0.0.1\"\n"
+                              "[axis_lines]\ncolumns = [\"X\", \"Y\", \"Z\"]\n");
   }
   ~SimExample() override { fs::remove_all(folder_); }
 

@@ -56,6 +56,19 @@ TEST(RecordedLines, AreSentWithTheRecordedTimingFromTheConnectionOn) {
   EXPECT_FALSE(lines.finished());
 }
 
+/// Another device of the recording sets the timeline, later than these lines begin.
+TEST(RecordedLines, BeginWithALineWhereTheTimelineOfAnotherDeviceIs) {
+  ReplayTimeline timeline;
+  RecordedLines lines(recorded_lines(), timeline, false);
+  lines.connected(kReplayed);
+  EXPECT_EQ(lines.next_due(), HostTime::max());
+  timeline.restart(kRecorded + 580ms, kReplayed);
+  lines.advance(kReplayed);
+  EXPECT_EQ(lines.take_output(), "");
+  lines.advance(kReplayed + 20ms);
+  EXPECT_EQ(lines.take_output(), "");  // the end of a line whose beginning was not sent
+}
+
 TEST(RecordedLines, BreakTheConnectionAsRecordedAndContinueWithTheNextOne) {
   ReplayTimeline timeline;
   RecordedLines lines(recorded_lines(), timeline);

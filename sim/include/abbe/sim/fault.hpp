@@ -12,7 +12,7 @@ enum class FaultKind {
   // faults of a tracker
   BeamBreak,       ///< error packet and event NotReady, no points; after `duration_s` event Ready
   SpeedExceeded,   ///< points have this status at any speed
-  PrismError,      ///< points have this status
+  PrismError,      ///< points have this status; lines: an invalid status
   Stall,           ///< nothing is sent; afterwards everything is sent at once
   Mute,            ///< tracker: commands and points are discarded; encoder: the node sends nothing
   Reboot,          ///< event ServerClosing, connection lost; restarted after `duration_s`
@@ -72,7 +72,7 @@ struct Fault {
   std::uint8_t input = 0;  ///< input of an environment device, counted from 1; 0 = all
 };
 
-enum class FaultTarget { Tracker, Encoder, Environment, CounterCard, MeasuringMachine };
+enum class FaultTarget { Tracker, Encoder, Environment, CounterCard, MeasuringMachine, AxisLines };
 
 struct ScheduledFault {
   FaultTarget target = FaultTarget::Tracker;

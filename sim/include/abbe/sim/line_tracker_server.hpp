@@ -1,5 +1,5 @@
 #pragma once
-/// The program that prints the lines of a simulated or a recorded tracker, on its transport.
+/// The program that prints the lines of a simulated or a recorded device, on its transport.
 /// Steppable: poll(now) never blocks and reads no clock. Not thread-safe.
 
 #include <poll.h>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abbe/sim/error.hpp"
+#include "abbe/sim/line_axes.hpp"
 #include "abbe/sim/line_tracker.hpp"
 #include "abbe/sim/pseudo_terminal.hpp"
 #include "abbe/sim/recorded_lines.hpp"
@@ -32,7 +33,7 @@ struct LineOutput {
   std::string link;        ///< Serial: path of the symbolic link to the receiver's end
 };
 
-/// `Source`: LineTracker or RecordedLines.
+/// `Source`: LineTracker, LineAxes or RecordedLines.
 template <class Source>
 class LineServer {
  public:
@@ -71,5 +72,6 @@ class LineServer {
 };
 
 using LineTrackerServer = LineServer<LineTracker>;
+using LineAxesServer = LineServer<LineAxes>;
 
 }  // namespace abbe::sim

@@ -1,8 +1,8 @@
 #pragma once
-/// The lines of a tracker from a recording, sent again read by read with their original timing. The
+/// The lines of a device from a recording, sent again read by read with their original timing. The
 /// time runs from the first connection on. A connection that broke in the recording breaks again;
 /// the next one replays the next recorded one, and after the last one the recording begins again.
-/// Interface as LineTracker.
+/// Interface as LineSource.
 
 #include <string>
 #include <vector>
@@ -13,8 +13,9 @@ namespace abbe::sim {
 
 class RecordedLines {
  public:
-  /// `timeline` must outlive it.
-  RecordedLines(const RecordedDevice& device, ReplayTimeline& timeline);
+  /// `timeline` must outlive it. `leads`: a connection sets the timeline; else another device does,
+  /// and what was recorded before it is not sent.
+  RecordedLines(const RecordedDevice& device, ReplayTimeline& timeline, bool leads = true);
 
   void connected(HostTime now);
   void disconnected();
@@ -35,7 +36,11 @@ class RecordedLines {
   };
   [[nodiscard]] const Connection& connection() const { return connections_[connection_]; }
 
+  void print(const RecordedBlock& block);
+
   ReplayTimeline& timeline_;
+  bool leads_;
+  bool within_line_ = false;  ///< the bytes before were not sent
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
   std::size_t next_ = 0;  ///< block of the connection

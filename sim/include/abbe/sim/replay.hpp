@@ -22,10 +22,10 @@ struct ReplaySetup {
   std::map<std::string, std::uint16_t> ports;  ///< TCP, by the name of the device
   /// path of the link to a pseudo terminal, by the name of the device
   std::map<std::string, std::string> links;
-  /// serial numbers of counter cards, by the name of the device
-  std::map<std::string, std::string> serials;
-  /// Output of the lines of a tracker, by its name; by default it listens.
+  std::map<std::string, std::string> serials;  ///< of counter cards, by the name of the device
+  /// How the lines of a device leave, by its name; default: it listens.
   std::map<std::string, LineOutput> lines;
+  std::string axes;  ///< the device whose lines are positions of axes; tracker_port is not its port
 };
 
 /// The place at which a device is served.

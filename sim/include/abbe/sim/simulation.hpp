@@ -31,6 +31,11 @@ struct PrintedLines {
   LineOutput output;
 };
 
+struct PrintedAxes {
+  LineAxesOptions options;
+  LineOutput output;
+};
+
 struct SimulationSetup {
   TruthMachine truth;
   PathPlan path;
@@ -46,6 +51,8 @@ struct SimulationSetup {
   /// The tracker prints lines instead of emScon. Model and delay are those of `tracker`, the port
   /// is `tracker_port`.
   std::optional<PrintedLines> tracker_lines;
+  /// The control prints the positions of the axes as lines.
+  std::optional<PrintedAxes> axis_lines;
   /// UDP port of the position records of a control, which the machine then follows instead of
   /// `path`; 0: the kernel chooses it. nullopt: no control.
   std::optional<std::uint16_t> control_port;
@@ -91,6 +98,7 @@ class Simulation {
   [[nodiscard]] const std::optional<ControlPort>& control() const { return control_; }
   [[nodiscard]] std::optional<TrackerServer>& tracker() { return tracker_; }
   [[nodiscard]] std::optional<LineTrackerServer>& line_tracker() { return line_tracker_; }
+  [[nodiscard]] std::optional<LineAxesServer>& line_axes() { return line_axes_; }
   [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
   [[nodiscard]] const std::vector<ModbusServer>& environment() const { return environment_; }
   [[nodiscard]] std::deque<UsbipServer>& counter_cards() { return counter_cards_; }
@@ -103,6 +111,7 @@ class Simulation {
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup,
              std::optional<ControlPort> control);
   [[nodiscard]] Result<void> open_tracker(const SimulationSetup& setup, HostTime now);
+  [[nodiscard]] Result<void> open_line_axes(const PrintedAxes& axes, HostTime now);
   void start_machine(HostTime now);
   void touch(HostTime now);
   void inject_environment(const Fault& fault, HostTime now);
@@ -115,6 +124,7 @@ class Simulation {
   std::chrono::nanoseconds standstill_;
   std::optional<TrackerServer> tracker_;
   std::optional<LineTrackerServer> line_tracker_;
+  std::optional<LineAxesServer> line_axes_;
   std::optional<EncoderBus> bus_;
   bool bus_apart_;
   FaultTimetable bus_faults_;

@@ -16,13 +16,12 @@
 #include <cstdint>
 
 #include "abbe/protocol/time.hpp"
+#include "abbe/sim/device_clock.hpp"
 #include "abbe/sim/reference_nests.hpp"
 #include "abbe/sim/tracker_drift.hpp"
 #include "abbe/sim/virtual_machine.hpp"
 
 namespace abbe::sim {
-
-using protocol::DeviceTime;
 
 struct TrackerModel {
   Eigen::Vector3d position_m{-0.75, -0.62, -0.35};     ///< P, machine coordinates
@@ -61,6 +60,9 @@ struct MeasuringTime {
 [[nodiscard]] TrackerView observe(const TrackerModel& model, const VirtualMachine& machine,
                                   HostTime at, std::uint64_t index);
 
+[[nodiscard]] inline DeviceClock clock_of(const TrackerModel& model) {
+  return {model.clock_offset_s, model.clock_drift_ppm};
+}
 /// Conversion of host time to the tracker's clock and back. At `power_on` the tracker's clock reads
 /// clock_offset_s.
 [[nodiscard]] DeviceTime device_time(const TrackerModel& model, HostTime power_on, HostTime at);

@@ -69,6 +69,9 @@ struct ConfigKind {
 
 /// The axis readings of all devices that read the axes.
 [[nodiscard]] std::vector<AxisReadings> axis_readings(const Config& config);
+/// Adds a fault at `key` of the table `own` if a device of another table reads this axis already.
+void refuse_claimed_axis(ClassifiedSection& table, std::string_view key, const std::string& axis,
+                         std::string_view own, const Config& config);
 /// True if a device that always reads the axes (a kind without `axes_if_no_other`) is configured.
 [[nodiscard]] bool axes_have_own_device(const Config& config);
 

@@ -83,6 +83,13 @@ std::vector<AxisReadings> axis_readings(const Config& config) {
   return all;
 }
 
+void refuse_claimed_axis(ClassifiedSection& table, std::string_view key, const std::string& axis,
+                         std::string_view own, const Config& config) {
+  for (const AxisReadings& other : axis_readings(config))
+    if (std::ranges::find(other.axes, axis) != other.axes.end())
+      table.fault(key, fmt::format("axis {} is claimed by [{}] and [{}]", axis, other.key, own));
+}
+
 bool axes_have_own_device(const Config& config) {
   return std::ranges::any_of(config_kinds(), [&config](const ConfigKind& kind) {
     return kind.axes != nullptr && !kind.axes_if_no_other && kind.axes(config);

@@ -13,8 +13,9 @@ using namespace std::chrono_literals;
 
 TEST(Capabilities, NameTheTablesOfTheirKinds) {
   EXPECT_EQ(tables_with(Capability::TrackerPoints), "[tracker]");
-  EXPECT_EQ(tables_with(Capability::Axes), "[encoder], [counter_card] or [cmm]");
-  EXPECT_EQ(tables_with(Capability::NamedAxes, "nor"), "[encoder] nor [counter_card]");
+  EXPECT_EQ(tables_with(Capability::Axes), "[encoder], [counter_card], [axis_lines] or [cmm]");
+  EXPECT_EQ(tables_with(Capability::NamedAxes, "nor"),
+            "[encoder], [counter_card] nor [axis_lines]");
   EXPECT_EQ(tables_with(Capability::CountedAxes), "[counter_card]");
   EXPECT_EQ(tables_with(Capability::Marks), "[reference]");
   EXPECT_EQ(tables_with(Capability::Touches, "nor"), "[probe] nor [cmm]");

@@ -128,6 +128,23 @@ point_rate_hz = 250
 weather = "compute"
 )";
 
+/// A control that prints the positions of its axes.
+const std::string kAxisLines = kAxesOfFive + R"([axis_lines]
+transport = "tcp"
+host = "192.168.0.1"
+port = 7002
+columns = ["time", "X", "Y", "Z", "B", "status"]
+valid_status = ["0"]
+length_unit = "m"
+angle_unit = "deg"
+time_unit = "ms"
+separator = "semicolon"
+decimal = "comma"
+sample_rate_hz = 250
+axes_compensated = false
+axes = [{ axis = "X", offset_mm = 0.5, invert = false }, { axis = "B", offset_rad = 0.1 }]
+)";
+
 const std::string kCoolantCorrectsY = R"(
 [[thermal]]
 axis = "Y"
@@ -173,6 +190,23 @@ const std::vector<Base>& bases() {
         {"tracker.separator", R"("tab")"},
         {"tracker.decimal", R"("point")"},
         {"tracker.weather", R"("none")"}}},
+      {"axes as lines",
+       kAxisLines,
+       {{"axis_lines.host", R"("192.168.0.2")"},
+        {"axis_lines.transport", R"("udp")"},
+        {"axis_lines.columns", R"(["X", "time", "Y", "Z", "B", "status"])"},
+        {"axis_lines.length_unit", R"("mm")"},
+        {"axis_lines.angle_unit", R"("gon")"},
+        {"axis_lines.time_unit", R"("us")"},
+        {"axis_lines.separator", R"("tab")"},
+        {"axis_lines.decimal", R"("point")"},
+        {"axis_lines.axes.axis", ""},
+        // The nodes end where the travel ends.
+        {"axes.min_mm", ""},
+        {"axes.max_mm", ""}},
+       {"axis_lines.columns", "axis_lines.valid_status", "axis_lines.length_unit",
+        "axis_lines.angle_unit", "axis_lines.time_unit", "axis_lines.axes_compensated",
+        "axis_lines.axes.offset_mm", "axis_lines.axes.offset_rad", "axis_lines.axes.invert"}},
       {"encoders of the machine",
        kExternalEncoders,
        // The nodes end where the travel ends.

@@ -62,16 +62,6 @@ drivers::CounterAxis read_counted_axis(ClassifiedSection& section, const Machine
   return axis;
 }
 
-/// Adds a fault for each axis of the card that another device reads already.
-void refuse_claimed_axes(ClassifiedSection& table, const drivers::CounterCardWiring& wiring,
-                         const Config& config) {
-  for (const auto& axis : wiring.axes)
-    for (const AxisReadings& other : axis_readings(config))
-      if (std::ranges::find(other.axes, axis.name) != other.axes.end())
-        table.fault("axes", fmt::format("axis {} is claimed by [{}] and [counter_card]", axis.name,
-                                        other.key));
-}
-
 void read_counter_card(ClassifiedSection& root, Config& out, StreamNames& names) {
   ClassifiedSection table = root.child("counter_card");
   if (!table.present()) return;
@@ -92,7 +82,8 @@ void read_counter_card(ClassifiedSection& root, Config& out, StreamNames& names)
   // The driver checks the wiring; the text of its error names axis and channel.
   if (const auto possible = drivers::check(card.wiring); !possible)
     table.fault("", possible.error().text);
-  refuse_claimed_axes(table, card.wiring, out);
+  for (const auto& axis : card.wiring.axes)
+    refuse_claimed_axis(table, "axes", axis.name, CounterCardConfig::kKind.key, out);
   table.close();
   names.take(card.name, table);
   out.of<CounterCardConfig>() = std::move(config);

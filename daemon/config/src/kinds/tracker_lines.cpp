@@ -74,10 +74,10 @@ void read_columns_of_line(ClassifiedSection& section, LineFormat& format) {
   }
 }
 
-void read_valid_status(ClassifiedSection& section, LineFormat& format) {
-  const bool has_column = format.has(Column::Status);
+void read_valid_status(ClassifiedSection& section, Role role, bool has_column,
+                       lines::LineSyntax& format) {
   std::vector<std::string> words;
-  section.get(measurement("valid_status"), words);
+  section.get(Key{"valid_status", role}, words);
   if (has_column == !words.empty()) {
     if (words.size() > LineFormat::kMostWords)
       return section.fault("valid_status",
@@ -104,12 +104,7 @@ LineFormat read_format(ClassifiedSection& section) {
                            Need::Required);
   section.get_word<double>(measurement("angle_unit"), format.radians_per_angle, kAngleUnits,
                            format.has(Column::Azimuth) ? Need::Required : Need::Optional);
-  section.get_word<lines::TimeUnit>(measurement("time_unit"), format.time_unit, kTimeUnits);
-  section.get_word<char>(operation("separator"), format.separator,
-                         {{"space", ' '}, {"tab", '\t'}, {"comma", ','}, {"semicolon", ';'}});
-  section.get_word<char>(operation("decimal"), format.decimal_sign,
-                         {{"point", '.'}, {"comma", ','}});
-  read_valid_status(section, format);
+  read_line_syntax(section, Role::Measurement, format.has(Column::Status), format);
   if (format.column_count == 0) return format;
   if (const auto what = lines::format_fault(format); !what.empty()) section.fault("columns", what);
   const auto unused = [&](std::string_view key, bool used) {
@@ -132,7 +127,7 @@ drivers::LineSerial read_serial(ClassifiedSection& section) {
   return line;
 }
 
-drivers::LineAddress read_address(ClassifiedSection& section) {
+drivers::LineAddress read_any_address(ClassifiedSection& section) {
   LineTransport transport = LineTransport::Tcp;
   section.get_word<LineTransport>(operation("transport"), transport,
                                   {{"tcp", LineTransport::Tcp},
@@ -234,7 +229,7 @@ Result<drivers::LineAddress> line_address(const StatedLines& stated) {
   Faults faults("options", kMostConfigFaults);
   Meaning unused;
   ClassifiedSection section{Section{&*table, "", {1, 1}, faults, Origin::Written}, "", unused};
-  auto address = read_address(section);
+  auto address = read_any_address(section);
   if (!faults.any())
     if (const auto valid = drivers::check(address); !valid)
       return fail(ErrorCode::Usage, valid.error().text);
@@ -242,6 +237,32 @@ Result<drivers::LineAddress> line_address(const StatedLines& stated) {
   Error error = faults.to_error();
   error.code = ErrorCode::Usage;
   return tl::make_unexpected(std::move(error));
+}
+
+const std::vector<std::pair<std::string_view, double>>& line_length_units() {
+  return kLengthUnits;
+}
+
+const std::vector<std::pair<std::string_view, double>>& line_angle_units() {
+  return kAngleUnits;
+}
+
+void read_line_syntax(ClassifiedSection& section, Role role, bool has_status,
+                      lines::LineSyntax& format) {
+  section.get_word<lines::TimeUnit>(Key{"time_unit", role}, format.time_unit, kTimeUnits);
+  section.get_word<char>(operation("separator"), format.separator,
+                         {{"space", ' '}, {"tab", '\t'}, {"comma", ','}, {"semicolon", ';'}});
+  section.get_word<char>(operation("decimal"), format.decimal_sign,
+                         {{"point", '.'}, {"comma", ','}});
+  read_valid_status(section, role, has_status, format);
+}
+
+drivers::LineAddress read_line_address(ClassifiedSection& section) {
+  auto address = read_any_address(section);
+  const auto valid = drivers::check(address);
+  const bool given = section.has("host") ? section.has("port") : section.has("serial");
+  if (!valid && given) section.fault(section.has("host") ? "host" : "baud", valid.error().text);
+  return address;
 }
 
 std::string format_text(const LineFormat& format) {
@@ -257,11 +278,7 @@ std::string format_text(const LineFormat& format) {
 }
 
 LinesConfig read_lines(ClassifiedSection& section) {
-  LinesConfig config{.address = read_address(section), .format = read_format(section)};
-  const auto valid = drivers::check(config.address);
-  const bool given = section.has("host") ? section.has("port") : section.has("serial");
-  if (!valid && given) section.fault(section.has("host") ? "host" : "baud", valid.error().text);
-  return config;
+  return {.address = read_line_address(section), .format = read_format(section)};
 }
 
 void refuse_lines_keys(ClassifiedSection& section) {

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "abbe/config/kinds/axis_lines.hpp"
 #include "abbe/config/kinds/counter_card.hpp"
 #include "abbe/config/kinds/encoder.hpp"
 #include "abbe/config/kinds/environment.hpp"
@@ -21,9 +22,9 @@ namespace abbe::daemon {
 /// The configured devices of every kind. optional: at most one device of the kind; vector: any
 /// number of devices, in the order of the file.
 using DeviceConfigs = std::tuple<std::optional<TrackerConfig>, std::optional<EncoderConfig>,
-                                 std::optional<CounterCardConfig>, std::optional<ReferenceConfig>,
-                                 std::optional<ProbeConfig>, std::optional<CmmConfig>,
-                                 std::vector<EnvironmentConfig>>;
+                                 std::optional<CounterCardConfig>, std::optional<AxisLinesConfig>,
+                                 std::optional<ReferenceConfig>, std::optional<ProbeConfig>,
+                                 std::optional<CmmConfig>, std::vector<EnvironmentConfig>>;
 
 template <class Element, class... Elements>
 [[nodiscard]] constexpr bool has_element(std::type_identity<std::tuple<Elements...>>) noexcept {

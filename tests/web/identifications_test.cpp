@@ -35,7 +35,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 /// An identification may end before a test that wants to see it run asks again.
-constexpr int kAttempts = 20;
+constexpr int kMostAnswers = 20;
 
 /// The configuration of the recording with limits that no model keeps.
 std::string strict_toml() {
@@ -146,7 +146,7 @@ TEST_F(IdentificationsTest, AFaultThatTheTaskFindsIsItsFailure) {
 TEST_F(IdentificationsTest, ASecondOneIsRefusedUntilTheFirstHasEnded) {
   const auto page = identifications();
   daemon::Result<void> second;
-  for (int i = 0; second && i < kAttempts; ++i) {
+  for (int i = 0; second && i < kMostAnswers; ++i) {
     (void)outcome_of(*page);
     ASSERT_TRUE(page->begin(body(), "anna"));
     second = page->begin(body(), "bert");
@@ -163,7 +163,7 @@ TEST_F(IdentificationsTest, CancellingEndsItAndTheNextOneRuns) {
   const auto page = identifications();
   EXPECT_EQ(page->cancel("anna").error().code, ErrorCode::Refused);
   json outcome;
-  for (int i = 0; outcome["state"] != "failed" && i < kAttempts; ++i) {
+  for (int i = 0; outcome["state"] != "failed" && i < kMostAnswers; ++i) {
     ASSERT_TRUE(page->begin(body(), "anna"));
     (void)page->cancel("bert");
     outcome = end_of(*page);
@@ -285,7 +285,7 @@ TEST_F(IdentifyPage, WithoutAbbedNothingIsAdded) {
 TEST_F(IdentifyPage, RunsBesideNoReplay) {
   ASSERT_NO_FATAL_FAILURE(start_with_recording());
   int status = 200;
-  for (int i = 0; status == 200 && i < kAttempts; ++i) {
+  for (int i = 0; status == 200 && i < kMostAnswers; ++i) {
     (void)end();
     EXPECT_EQ(post(in_, "/api/identify", request()), 200);
     status = post(in_, "/api/replay", {{"name", name_}});

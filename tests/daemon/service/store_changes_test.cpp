@@ -117,7 +117,8 @@ TEST_F(StoreAdditionTest, AModelIsAddedWithItsVerdictAndNotActivated) {
 }
 
 TEST_F(StoreAdditionTest, AModelWithoutVerdictOrOfAnotherMachineIsNotAdded) {
-  const ModelDocument unjudged = synthetic_document(3);
+  ModelDocument unjudged = synthetic_document(3);
+  unjudged.verdict.reset();
   const auto without = add(unjudged, unjudged.machine_hash);
   ASSERT_FALSE(without);
   EXPECT_EQ(without.error().code, ErrorCode::BadInput);

@@ -80,16 +80,16 @@ class IdentificationsTest : public ::testing::Test {
 TEST_F(IdentificationsTest, ARunIsIdentifiedWithItsOptionsAndAccepted) {
   const auto page = identifications();
   EXPECT_EQ(page->status()["state"], "none");
-  const json outcome = outcome_of(*page, {{"tables", "cubic"}, {"smoothness_um", ""}});
+  const json outcome = outcome_of(*page, {{"backlash", "none"}, {"smoothness_um", ""}});
   ASSERT_EQ(outcome["state"], "done") << outcome;
-  EXPECT_EQ(outcome["options"], json::array({"tables cubic"}));
+  EXPECT_EQ(outcome["options"], json::array({"backlash none"}));
   EXPECT_EQ(outcome["result"]["accepted"], true) << outcome;
   EXPECT_EQ(outcome["result"]["added"], false);
   EXPECT_THAT(outcome["result"]["figures"].get<std::string>(), HasSubstr("without compensation"));
 
   const auto model = page->model(outcome["result"]["id"]);
   ASSERT_TRUE(model) << model.error().text;
-  EXPECT_EQ(model->from, "identified again from " + name_ + ": tables cubic");
+  EXPECT_EQ(model->from, "identified again from " + name_ + ": backlash none");
   const auto document = daemon::parse_model(model->text, "model.json");
   ASSERT_TRUE(document) << document.error().text;
   EXPECT_EQ(model_id(*document), model->id);

@@ -12,13 +12,13 @@ await withPage(url, out, async (context) => {
   if (await page.$('button[aria-label^="Identify "]')) throw new Error("the button is shown without a log in");
   await logIn(context, "calibrate", password);
   await press(context, 'button[aria-label^="Identify "]');
-  await page.waitForSelector("dialog.ask[open] #identify-tables");
-  await page.select("#identify-tables", "cubic");
+  await page.waitForSelector("dialog.ask[open] #identify-backlash");
+  await page.select("#identify-backlash", "none");
   await screenshot(context, "identify-options");
   const faults = await violations(context);
   await answerQuestion(context, "Identify");
   await waitForText(context, "not in the store yet", "#identification");
-  await waitForText(context, "Options: tables cubic; begun by calibrate", "#view");
+  await waitForText(context, "Options: backlash none; begun by calibrate", "#view");
   await screenshot(context, "identify-done");
   faults.push(...await violations(context));
   await clickButton(context, "Add to the store");

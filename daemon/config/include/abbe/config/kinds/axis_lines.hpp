@@ -39,7 +39,7 @@ struct AxisLinesConfig {
   /// Without a time column: upper bound of the delay between a measurement and the arrival of its
   /// line. nullopt: there is a time column.
   std::optional<std::chrono::nanoseconds> latency;
-  /// With a time column: as in TrackerConfig.
+  /// With a time column: upper bound of the constant delay of a line after its measurement.
   std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{2}};
   /// True: the control already corrects these readings.
   bool axes_compensated = false;

@@ -122,7 +122,11 @@ export function identificationView(place, wanted = () => true) {
     const now = await get("api/identify");
     if (ended) return;
     draw(now);
-    if (now.state === "running") timer = setTimeout(() => follow().catch(() => {}), kPoll_ms);
+    if (now.state === "running") lookAgain();
+  };
+  // Also after an answer that was lost: else the view would stay at "running".
+  const lookAgain = () => {
+    timer = setTimeout(() => follow().catch(() => { if (!ended) lookAgain(); }), kPoll_ms);
   };
   return { follow, end: () => { ended = true; clearTimeout(timer); } };
 }
